@@ -12,6 +12,7 @@ import subprocess
 import sys
 import time
 from contextlib import contextmanager
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -19,9 +20,13 @@ import pytest
 from protocol.ur_types import Ports
 
 TIMEOUT = 20.0  # s
+PROGRAMS = Path(__file__).parents[1] / "programs"
+E_SERIES = ("--robot", "ur5e", "--software", "5.25.1")
 # Parameters of `box`: of a CB3, and of an e-Series box.
 BOTH_GENERATIONS = pytest.mark.parametrize(
-    "box", [(), ("--robot", "ur5e", "--software", "5.25.1")], indirect=True, ids=["cb3", "e-series"]
+    "box",
+    [pytest.param((), id="cb3"), pytest.param(E_SERIES, id="e-series", marks=pytest.mark.nightly)],
+    indirect=True,
 )
 
 

@@ -1,7 +1,12 @@
 """Boxes in processes of their own, for clients that hard-code the ports."""
 
+import sys
+from pathlib import Path
+
 import pytest
 from clients_support import served_box
+
+sys.path.append(str(Path(__file__).parents[1] / "ur_emulator"))  # its program files are of use here too
 
 
 @pytest.fixture(scope="module", params=[()], ids=["cb3"])
@@ -11,21 +16,6 @@ def box(tmp_path_factory, request):
     A CB3 with software 3.15, unless the parameter has other options.
     """
     with served_box(tmp_path_factory.mktemp("box"), *request.param) as served:
-        yield served
-
-
-@pytest.fixture(scope="module")
-def old_box(tmp_path_factory):
-    """A CB3 with software 3.4 and a gripper."""
-    options = ("--software", "3.4.0", "--tool", "robotiq-2f85")
-    with served_box(tmp_path_factory.mktemp("old_box"), *options) as served:
-        yield served
-
-
-@pytest.fixture
-def lockstep_box(tmp_path):
-    """A box whose time stands still while a program waits for its PC."""
-    with served_box(tmp_path, "--pace", "lockstep") as served:
         yield served
 
 

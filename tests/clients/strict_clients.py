@@ -12,17 +12,9 @@ from clients_support import TIMEOUT, connect, receive_exactly
 
 VERSION, CONTROLLER, TEXT_MESSAGE, DATA, OUTPUTS, INPUTS, START, PAUSE = map(ord, "VvMUOISP")
 FORMATS = {
-    "BOOL": "?",
-    "UINT8": "B",
-    "UINT32": "I",
-    "UINT64": "Q",
-    "INT32": "i",
-    "DOUBLE": "d",
-    "VECTOR3D": "3d",
-    "VECTOR6D": "6d",
-    "VECTOR6INT32": "6i",
-    "VECTOR6UINT32": "6I",
-}
+    "BOOL": "?", "UINT8": "B", "UINT32": "I", "UINT64": "Q", "INT32": "i", "DOUBLE": "d", "VECTOR3D": "3d",
+    "VECTOR6D": "6d", "VECTOR6INT32": "6i", "VECTOR6UINT32": "6I",
+}  # fmt: skip
 
 
 class Recipe:

@@ -9,11 +9,10 @@ the manner of ur_modern_driver: an unnamed socket, messages of 7 integers, local
 import socket
 import struct
 from contextlib import ExitStack, contextmanager
-from pathlib import Path
 
 import numpy as np
 import pytest
-from clients_support import BOTH_GENERATIONS, TIMEOUT, connect, receive_exactly
+from clients_support import BOTH_GENERATIONS, PROGRAMS, TIMEOUT, connect, receive_exactly, served_box
 from strict_clients import VERSION_MESSAGE, PrimaryWire, StrictRtde
 
 SCALE = 1_000_000
@@ -21,17 +20,9 @@ STOP, UNINITIALIZED, IDLE, SERVOJ, SPEEDJ, TRAJECTORY, SPEEDL = -2, -1, 0, 1, 2,
 TRAJECTORY_START = 1
 DONE, CANCELLED, FAILED = 0, 1, 2
 MOVEJ = 0
-PROGRAMS = Path(__file__).parents[1] / "programs"
 OUTPUTS = (
-    "timestamp",
-    "target_q",
-    "target_qd",
-    "target_TCP_pose",
-    "target_TCP_speed",
-    "actual_q",
-    "runtime_state",
-    "payload",
-)
+    "timestamp", "target_q", "target_qd", "target_TCP_pose", "target_TCP_speed", "actual_q", "runtime_state", "payload",
+)  # fmt: skip
 STOPPED, PLAYING = 1, 2
 
 
@@ -140,7 +131,7 @@ def test_servo_set_points_are_followed(box):
 
 
 @BOTH_GENERATIONS
-def test_joint_and_tool_speeds(box):
+def test_joint_and_tool_speeds_and_commands(box):
     with driver(box) as (rtde, servers):
         for _ in range(60):
             values = rtde.data()
@@ -150,8 +141,11 @@ def test_joint_and_tool_speeds(box):
             values = rtde.data()
             servers.send(SPEEDL, (0, 0, 0.05, 0, 0, 0))
         assert np.allclose(values["target_TCP_speed"], (0, 0, 0.05, 0, 0, 0), atol=1e-3)
-        servers.send(IDLE)
+        servers.send(IDLE, timeout_ms=0)
         rtde.until(lambda v: not any(v["target_qd"]))
+        for mass in (0.75, 0.0):  # by the socket of commands
+            servers.tell(1, round(mass * SCALE), 0, 0, 40_000)
+            rtde.until(lambda v, mass=mass: v["payload"] == mass)
 
 
 @BOTH_GENERATIONS
@@ -177,17 +171,7 @@ def test_a_trajectory_with_blends_and_one_that_is_cancelled(box):
 
 
 @BOTH_GENERATIONS
-def test_script_commands(box):
-    with driver(box) as (rtde, servers):
-        servers.send(IDLE, timeout_ms=0)
-        servers.tell(1, 750_000, 0, 0, 40_000)
-        rtde.until(lambda v: v["payload"] == 0.75)
-        servers.tell(1, 0)
-        rtde.until(lambda v: v["payload"] == 0.0)
-
-
-@BOTH_GENERATIONS
-@pytest.mark.parametrize("mode", [SERVOJ, SPEEDJ, IDLE])
+@pytest.mark.parametrize("mode", [SERVOJ, pytest.param(IDLE, marks=pytest.mark.nightly)])
 def test_silence_ends_the_program(box, mode):
     """As long as was said with the last message, and not before."""
     with driver(box) as (rtde, servers):
@@ -232,7 +216,7 @@ def test_a_second_upload_replaces_the_first(box):
 # --- the older driver
 
 
-def test_its_first_read_holds_the_version(box):
+def test_its_reads_hold_the_version_and_whole_realtime_packages(box):
     """One read of 512 bytes: the message comes first and whole."""
     with connect(box, "primary") as sock:
         data = sock.recv(512)
@@ -247,9 +231,6 @@ def test_its_first_read_holds_the_version(box):
         major, minor, bugfix = struct.unpack_from(">BBi", data, 16 + length)
         assert (major, minor, bugfix) == (3, 15, 8)
         assert len(data[16 + length + 10 :]) <= 20
-
-
-def test_one_read_is_one_realtime_package(box):
     with connect(box, "realtime") as sock:
         for _ in range(50):
             # A read that comes late finds more than one package, but always whole ones.
@@ -273,29 +254,14 @@ def test_a_stream_of_one_line_programs_is_one_motion(box):
         rtde.until(lambda v: not any(v["target_qd"]))
 
 
-def test_a_secondary_program_sets_outputs_while_another_moves(box):
-    with StrictRtde(box) as rtde, connect(box, "realtime") as script:
-        rtde.want("timestamp", "target_qd", "actual_digital_output_bits", "runtime_state")
-        rtde.start()
-        script.sendall(
-            b"def turn():\n\twhile True:\n\t\tspeedj([0.1, 0, 0, 0, 0, 0], 1.0, 0.1)\n\tend\nend\n"
-        )
-        rtde.until(lambda v: v["target_qd"][0] > 0.05)
-        for level in ("True", "False"):
-            script.sendall(f"sec setOut():\n\tset_standard_digital_out(5, {level})\nend\n".encode())
-            seen = rtde.until(
-                lambda v, level=level: bool(v["actual_digital_output_bits"] & 32) == (level == "True")
-            )
-            assert seen["runtime_state"] == PLAYING
-            assert seen["target_qd"][0] > 0.05
-        script.sendall(b"stopj(10)\n")
-        rtde.until(lambda v: not any(v["target_qd"]) and v["runtime_state"] == STOPPED)
-
-
-def test_a_reverse_program_follows_points_that_come_four_times_a_cycle(lockstep_box):
+@pytest.mark.nightly
+def test_a_reverse_program_follows_points_that_come_four_times_a_cycle(tmp_path):
     """In lockstep: the arm brakes in every cycle without a fresh point, and this PC may be late."""
-    box = lockstep_box
-    with StrictRtde(box) as rtde, socket.create_server(("127.0.0.1", 0)) as server:
+    with (
+        served_box(tmp_path, "--pace", "lockstep") as box,
+        StrictRtde(box) as rtde,
+        socket.create_server(("127.0.0.1", 0)) as server,
+    ):
         server.settimeout(TIMEOUT)
         rtde.want(*OUTPUTS)
         rtde.start()
@@ -316,12 +282,8 @@ def test_a_reverse_program_follows_points_that_come_four_times_a_cycle(lockstep_
                 values = rtde.data()
                 track[values["timestamp"]] = values["target_q"][0] - start[0]
                 for quarter in range(4):
-                    point(
-                        np.add(
-                            start,
-                            [0.1 * np.sin(np.pi / 2 * min(1.0, (n + quarter / 4) / 125)), 0, 0, 0, 0, 0],
-                        )
-                    )
+                    turn = 0.1 * np.sin(np.pi / 2 * min(1.0, (n + quarter / 4) / 125))
+                    point(np.add(start, [turn, 0, 0, 0, 0, 0]))
             track = list(track.values())
             moved = np.diff(track)
             assert track[-1] == pytest.approx(0.1, abs=0.01)

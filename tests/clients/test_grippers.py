@@ -174,12 +174,8 @@ def test_pyrobotiqgripper(box, line, capsys):
     gripper.open()
     assert gripper.position() == 3
     gripper.move(100, speed=200, force=10)
-    assert (gripper.position(), gripper.positionCommand(), gripper.speed(), gripper.force()) == (
-        100,
-        100,
-        200,
-        10,
-    )
+    asked = gripper.positionCommand(), gripper.speed(), gripper.force()
+    assert (gripper.position(), *asked) == (100, 100, 200, 10)
     assert gripper.lastMoveDirection() == 1
     gripper.move(200, speed=None, force=None, readStatus=False, wait=False)
     gripper.stop()
@@ -212,12 +208,11 @@ def test_pyrobotiqgripper(box, line, capsys):
     assert list(status) == ["gOBJ", "gSTA", "gGTO", "gACT", "kFLT", "gFLT", "gPR", "gPO", "gCU"]
     assert list(status.values()) == [3, 3, 1, 1, 0, 0, 0, 3, 0]
     gripper.printStatus()
-    assert "stopped due to a contact while closing" in (said := capsys.readouterr().out)
+    said = capsys.readouterr().out
+    assert "stopped due to a contact while closing" in said
     assert "Activation is completed" in said
-    assert (
-        gripper.historyNumpy().shape[1]
-        == len(client.COMMAND_HISTORY_COLUMNS_ID_2_NAME) + len(client.STATUS_HISTORY_COLUMNS_ID_2_NAME) - 1
-    )
+    columns = *client.COMMAND_HISTORY_COLUMNS_ID_2_NAME, *client.STATUS_HISTORY_COLUMNS_ID_2_NAME
+    assert gripper.historyNumpy().shape[1] == len(columns) - 1
     gripper.disconnect()
 
 
@@ -289,6 +284,7 @@ def test_minimalmodbus(line):
         gripper.serial.close()
 
 
+@pytest.mark.nightly
 def test_minimalmodbus_through_socat(line, tmp_path):
     """As the maker's script for tool communication does it: a serial port that socat makes of a connection."""
     client = pytest.importorskip("minimalmodbus")

@@ -22,14 +22,8 @@ RESTS = 0
 
 def run(*command, **environment):
     """Run a command to its end."""
-    return subprocess.run(
-        command,
-        capture_output=True,
-        text=True,
-        timeout=5 * TIMEOUT,
-        check=False,
-        env=os.environ | environment,
-    )
+    options = {"capture_output": True, "text": True, "timeout": 5 * TIMEOUT}
+    return subprocess.run(command, check=False, env=os.environ | environment, **options)
 
 
 def printed(*command, **environment):
@@ -97,14 +91,8 @@ def exchange(box):
 
     def compare(connect, port, *story):
         calls, expected = zip(*story, strict=True)
-        command = (
-            "node",
-            str(HERE / "modbus_serial_calls.js"),
-            connect,
-            box.host,
-            str(port),
-            json.dumps(calls),
-        )
+        script = str(HERE / "modbus_serial_calls.js")
+        command = "node", script, connect, box.host, str(port), json.dumps(calls)
         results = printed(*command, NODE_PATH=str(modules))
         for call, result, wanted in zip(calls, results, expected, strict=True):
             assert result == wanted, call

@@ -2,7 +2,7 @@
 
 import pytest
 from clients_support import served_box, wait_until
-from ur_rtde_support import Dashboard, dashboard_client
+from ur_rtde_support import Dashboard
 
 
 @pytest.fixture(scope="module")
@@ -40,6 +40,8 @@ def test_a_program_from_loading_to_the_end(dashboard):
     wait_until(lambda: dashboard.programState().startswith("STOPPED wait"))
     dashboard.stop()  # must answer `Stopped` although nothing runs
     dashboard.isProgramSaved()
+    with pytest.raises(RuntimeError, match="nothing"):
+        dashboard.loadURP("nothing.urp")
 
 
 def test_what_the_box_is(dashboard, cell):
@@ -61,25 +63,12 @@ def test_power(dashboard):
     wait_until(lambda: dashboard.robotmode() == "Robotmode: RUNNING")
 
 
-def test_popups_log_and_roles(dashboard, cell):
+def test_popups_the_log_and_the_end(dashboard, cell):
     dashboard.popup("look here")
     dashboard.closePopup()
     dashboard.closeSafetyPopup()
     dashboard.addToLog("said by ur_rtde")
     wait_until(lambda: "said by ur_rtde" in cell.log.read_text())
-    dashboard.setUserRole(dashboard_client.UserRole.OPERATOR) if hasattr(
-        dashboard_client, "UserRole"
-    ) else None
-
-
-def test_refusals_are_exceptions(dashboard):
-    with pytest.raises(RuntimeError, match="nothing"):
-        dashboard.loadURP("nothing.urp")
-
-
-def test_quit(cell):
-    client = Dashboard(cell.host, cell.ports.dashboard)
-    client.connect()
-    client.quit()
-    client.disconnect()
-    assert not client.isConnected()
+    dashboard.quit()
+    dashboard.disconnect()
+    assert not dashboard.isConnected()

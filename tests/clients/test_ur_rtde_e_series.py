@@ -5,6 +5,8 @@ import pytest
 from clients_support import served_box, wait_until
 from ur_rtde_support import RTDEIO, Dashboard, connected, servo_along_a_sine, shifted
 
+pytestmark = pytest.mark.nightly
+
 PERIOD = 0.002  # s
 HOME = (0.2238, -1.7062, -1.8784, -0.3550, 1.4132, 1.7304)  # rad
 
@@ -32,12 +34,6 @@ def test_a_package_comes_every_two_milliseconds(arm):
     assert steps.min() == pytest.approx(1.0)
 
 
-def test_what_only_e_series_software_sends(arm):
-    assert len(arm.receive.getFtRawWrench()) == len(arm.receive.getActualTCPForce()) == 6
-    assert arm.receive.getPayload() == 0.0
-    assert arm.receive.getPayloadInertia() == [0.0] * 6
-
-
 def test_joint_and_tool_moves(arm):
     wait_until(lambda: arm.control.getStepTime() == PERIOD, "the answer")
     goal = [HOME[0] + 0.2, *HOME[1:]]
@@ -56,7 +52,6 @@ def test_servo_j_streams_at_500_hz(arm):
 def test_speed_j_and_jogging(arm):
     assert arm.control.speedJ([0.4, 0, 0, 0, 0, 0], 4.0)
     arm.until(lambda r: r.getTargetQ()[0] - HOME[0] > 0.1)
-    assert arm.receive.getActualQd() == pytest.approx([0.4, 0, 0, 0, 0, 0], abs=0.02)
     assert arm.control.speedStop(8.0)
     arm.still()
     start = arm.receive.getTargetTCPPose()
@@ -91,6 +86,7 @@ def test_force_mode_pushes_the_tool(arm):
 
 def test_payload_history_and_contact_questions(arm):
     control, receive = arm.control, arm.receive
+    assert len(receive.getFtRawWrench()) == 6
     assert control.setPayload(1.5, [0, 0, 0.05])
     wait_until(lambda: receive.getPayload() == 1.5, "the payload")
     assert receive.getPayloadCog() == [0, 0, 0.05]
@@ -99,16 +95,6 @@ def test_payload_history_and_contact_questions(arm):
     assert control.setPayload(0.0, [0, 0, 0])
     wait_until(lambda: np.allclose(control.getActualJointPositionsHistory(10), HOME, atol=5e-4), "the answer")
     wait_until(lambda: control.toolContact([0, 0, 1, 0, 0, 0]) == 0, "the answer")
-
-
-def test_kinematics_of_a_tool_and_the_flange(arm):
-    control, pose, tool = arm.control, arm.receive.getTargetTCPPose(), [0, 0, 0.1, 0, 0, 0]
-    with_tool = control.poseTrans(pose, tool)
-    assert control.getForwardKinematics(list(HOME), tool) == pytest.approx(with_tool, abs=1e-6)
-    assert control.getInverseKinematics(pose, list(HOME)) == pytest.approx(HOME, abs=1e-6)
-    assert control.getInverseKinematicsHasSolution(pose, list(HOME))
-    assert not control.getInverseKinematicsHasSolution([3.0, 0, 0, 0, 0, 0], list(HOME))
-    wait_until(lambda: np.allclose(control.getActualToolFlangePose(), pose, atol=1e-3), "the answer")
 
 
 def test_contact_detection_and_freedrive(arm):
@@ -137,6 +123,16 @@ def test_dynamics(arm):
     # The client's script asks for those of the moment: the arm rests.
     zeros = [0.0] * 6
     wait_until(lambda: control.getCoriolisAndCentrifugalTorques(list(HOME), zeros) == zeros, "the answer")
+
+
+def test_kinematics_of_a_tool_and_the_flange(arm):
+    control, pose, tool = arm.control, arm.receive.getTargetTCPPose(), [0, 0, 0.1, 0, 0, 0]
+    with_tool = control.poseTrans(pose, tool)
+    assert control.getForwardKinematics(list(HOME), tool) == pytest.approx(with_tool, abs=1e-6)
+    assert control.getInverseKinematics(pose, list(HOME)) == pytest.approx(HOME, abs=1e-6)
+    assert control.getInverseKinematicsHasSolution(pose, list(HOME))
+    assert not control.getInverseKinematicsHasSolution([3.0, 0, 0, 0, 0, 0], list(HOME))
+    wait_until(lambda: np.allclose(control.getActualToolFlangePose(), pose, atol=1e-3), "the answer")
 
 
 def test_an_output_and_the_speed_slider(arm):

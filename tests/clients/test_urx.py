@@ -8,7 +8,7 @@ from contextlib import contextmanager
 
 import numpy as np
 import pytest
-from clients_support import TIMEOUT, connect, wait_until
+from clients_support import TIMEOUT, connect, served_box, wait_until
 
 urx = pytest.importorskip("urx")
 
@@ -30,6 +30,14 @@ def connected(kind, *arguments, **options):
         for thread in (client.secmon, client.rtmon):
             if thread is not None:
                 thread.join(TIMEOUT)
+
+
+@pytest.fixture(scope="module")
+def old_box(tmp_path_factory):
+    """A CB3 with software 3.4 and a gripper."""
+    options = ("--software", "3.4.0", "--tool", "robotiq-2f85")
+    with served_box(tmp_path_factory.mktemp("old_box"), *options) as served:
+        yield served
 
 
 @pytest.fixture(scope="module")
@@ -56,16 +64,6 @@ def at_rest(robot):
     return np.array(last[-1])
 
 
-def test_it_believes_that_the_robot_runs(robot):
-    assert robot.is_running()
-    assert not robot.is_program_running()
-    robot_data = robot.secmon.get_all_data()["RobotModeData"]
-    assert robot_data["robotMode"] == 7
-    assert robot_data["isPowerOnRobot"]
-    assert not robot_data["isEmergencyStopped"]
-    assert not robot_data["isSecurityStopped"]
-
-
 def test_joint_moves(robot):
     start = at_rest(robot)
     robot.movej(np.add(start, [0.3, 0, 0, 0, 0, 0]), acc=ACCELERATION, vel=SPEED)
@@ -84,9 +82,7 @@ def test_moves_to_poses(plain):
     at_rest(plain)
     assert np.allclose(plain.getl(wait=True), start, atol=CLOSE_X)
     corners = [
-        (np.add(up, [0, 0.04, 0, 0, 0, 0])).tolist(),
-        (np.add(start, [0, 0.04, 0, 0, 0, 0])).tolist(),
-        start.tolist(),
+        np.add(pose, [0, y, 0, 0, 0, 0]).tolist() for pose, y in ((up, 0.04), (start, 0.04), (start, 0))
     ]
     plain.movels(corners, 2.0, 0.3, 0.01)
     at_rest(plain)
@@ -104,6 +100,7 @@ def test_stops(robot):
     robot.movej(start, acc=ACCELERATION, vel=SPEED)
 
 
+@pytest.mark.nightly
 def test_speeds_with_t_min_are_refused(robot, old_box):
     """urx writes `t_min=`, which 3.x does not know: no motion, one error, and the client lives on."""
     start = at_rest(robot)
@@ -113,14 +110,13 @@ def test_speeds_with_t_min_are_refused(robot, old_box):
 
 
 def test_inputs_and_outputs(robot):
-    for n in range(8):
+    for n in (0, 7):
         robot.set_digital_out(n, True)
         wait_until(lambda n=n: robot.get_digital_out(n))
         assert robot.get_digital_out_bits() == 1 << n
         robot.set_digital_out(n, False)
         wait_until(lambda n=n: not robot.get_digital_out(n))
-    assert robot.get_digital_in_bits() == 0
-    assert robot.get_digital_in(1) == 0
+    assert robot.get_digital_in_bits() == robot.get_digital_in(1) == 0
     robot.set_analog_out(0, 0.5)
     wait_until(lambda: robot.secmon.get_all_data()["MasterBoardData"]["analogOutput0"] != 0)
     assert robot.get_analog_in(0) == pytest.approx(0.0, abs=0.02)

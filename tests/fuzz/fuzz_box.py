@@ -424,10 +424,7 @@ class FuzzBox:
             reader = self.readers[name]
             reader.finish()
             due = self.n_published * 10 // round(1 / self.period)
-            assert reader.n_states == 1 + due + self.n_mode_changes, (
-                name,
-                reader.n_states,
-            )
+            assert reader.n_states == 1 + due + self.n_mode_changes, (name, reader.n_states)
         for wires in self.hostile.values():
             for wire, reader in tuple(wires.items()):
                 reader.feed(wire.take())

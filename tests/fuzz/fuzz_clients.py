@@ -13,11 +13,10 @@ from pymodbus.pdu import DecodePDU
 
 from protocol.dashboard.commands import GREETING
 from protocol.dashboard.connection import MAX_LINE
-from protocol.frame_buffer import FrameBuffer
 from protocol.modbus import take_frame
 from protocol.modbus_rtu import crc16
 from protocol.primary.framing import MAX_PACKAGE_SIZE, MIN_PACKAGE_SIZE, PackageType
-from protocol.primary.packages import RobotState, decode_package
+from protocol.primary.packages import decode_package
 from protocol.realtime.layout import layout_for_version
 from protocol.rtde.codec import Role, decode_message
 from protocol.rtde.codec import RtdePackageType as RtdeType
@@ -92,77 +91,96 @@ class Wire:
         return bytes(taken)
 
 
-# pymodbus's decoder of answers.
-_MODBUS = DecodePDU(is_server=False)
+class Reader:
+    """Takes a stream apart, checks what is whole, and keeps the last answers.
 
-
-class RealtimeReader:
-    """Counts frames, decodes every tenth."""
-
-    def __init__(self, version):
-        self.buffer = FrameBuffer(2000)
-        self.layout = layout_for_version(version)
-        self.n_frames = 0
-
-    def feed(self, data):
-        self.buffer.feed(data)
-        while (frame := self.buffer.next_frame()) is not None:
-            self.n_frames += 1
-            if self.n_frames % 10 == 1:
-                self.layout.decode(frame)
-
-    def finish(self):
-        assert not self.buffer.pending
-
-
-class PrimaryReader:
-    """Decodes every message, and every fourth state: those of a box differ little."""
+    Attributes:
+        answers: what `check` has returned, None left out; at most the last fifty.
+    """
 
     def __init__(self, version):
-        self.version = version
-        self.buffer = FrameBuffer(MAX_PACKAGE_SIZE, MIN_PACKAGE_SIZE)
-        self.n_states = 0
-        self.messages = []
-
-    def feed(self, data):
-        self.buffer.feed(data)
-        while (frame := self.buffer.next_frame()) is not None:
-            if frame[4] == PackageType.ROBOT_STATE:
-                self.n_states += 1
-                if self.n_states % 4:
-                    continue
-            package = decode_package(frame, self.version)
-            if not isinstance(package, RobotState):
-                self.messages.append(package)
-                del self.messages[:-50]
-
-    def finish(self):
-        assert not self.buffer.pending
-
-
-class RtdeReader:
-    """Takes packages apart without knowing what was asked."""
-
-    def __init__(self, version):
-        self.buffer = bytearray()
-        self.n_replies = 0
+        self.version, self.buffer, self.answers = version, bytearray(), []
 
     def feed(self, data):
         self.buffer += data
-        while len(self.buffer) >= 3:
-            size = int.from_bytes(self.buffer[:2], "big")
-            assert size >= 3, "an RTDE package without a header"
-            if len(self.buffer) < size:
-                return
-            kind, payload = self.buffer[2], bytes(self.buffer[3:size])
-            del self.buffer[:size]
-            RtdeType(kind)
-            if kind != RtdeType.DATA_PACKAGE:
-                self.n_replies += 1
-                assert any(_decodes(kind, payload, version) for version in (1, 2)), (kind, payload)
+        while (one := self.take()) is not None:
+            if (answer := self.check(one)) is not None:
+                self.answers.append(answer)
+                del self.answers[:-50]
+
+    def take(self):
+        """Cut what is whole off the beginning of the buffer; None while nothing is."""
+        raise NotImplementedError
+
+    def check(self, one):
+        """Fail on what a port must not say; return what is kept."""
+        return one
 
     def finish(self):
         assert not self.buffer
+
+    def cut(self, size):
+        """Return so many bytes as soon as they are there."""
+        if len(self.buffer) < size:
+            return None
+        one = bytes(self.buffer[:size])
+        del self.buffer[:size]
+        return one
+
+    def cut_frame(self, size_bytes, least, most):
+        """Return a frame that begins with its size."""
+        if len(self.buffer) < size_bytes:
+            return None
+        size = int.from_bytes(self.buffer[:size_bytes], "big")
+        assert least <= size <= most, f"a frame of {size} bytes"
+        return self.cut(size)
+
+
+class RealtimeReader(Reader):
+    """Counts frames, decodes every tenth."""
+
+    def __init__(self, version):
+        super().__init__(version)
+        self.layout = layout_for_version(version)
+        self.n_frames = 0
+
+    def take(self):
+        return self.cut_frame(4, self.layout.size, self.layout.size)
+
+    def check(self, frame):
+        self.n_frames += 1
+        if self.n_frames % 10 == 1:
+            self.layout.decode(frame)
+
+
+class PrimaryReader(Reader):
+    """Decodes every message, and every fourth state: those of a box differ little."""
+
+    n_states = 0
+
+    def take(self):
+        return self.cut_frame(4, MIN_PACKAGE_SIZE, MAX_PACKAGE_SIZE)
+
+    def check(self, frame):
+        is_state = frame[4] == PackageType.ROBOT_STATE
+        self.n_states += is_state
+        if not is_state or self.n_states % 4 == 0:
+            decode_package(frame, self.version)
+
+
+class RtdeReader(Reader):
+    """Takes packages apart without knowing what was asked."""
+
+    n_replies = 0
+
+    def take(self):
+        return self.cut_frame(2, 3, 1 << 16)
+
+    def check(self, package):
+        kind = RtdeType(package[2])
+        if kind != RtdeType.DATA_PACKAGE:
+            self.n_replies += 1
+            assert any(_decodes(kind, package[3:], version) for version in (1, 2)), package
 
 
 def _decodes(kind, payload, version):
@@ -172,106 +190,71 @@ def _decodes(kind, payload, version):
         return False
 
 
-class DashboardReader:
-    """Keeps the last lines after the greeting."""
+class LineReader(Reader):
+    """Lines, without their ends."""
 
-    def __init__(self, version):
-        self.buffer = b""
-        self.answers = []
-        self.n_lines = 0
-
-    def feed(self, data):
-        *lines, self.buffer = (self.buffer + data).split(b"\n")
-        for line in lines:
-            assert len(line) <= MAX_LINE
-            assert b"\r" not in line
-            if not self.n_lines:
-                assert line.decode() == GREETING
-            else:
-                self.answers.append(line.decode("latin-1"))
-                del self.answers[:-50]
-            self.n_lines += 1
-
-    def finish(self):
-        assert not self.buffer
+    def take(self):
+        end = self.buffer.find(b"\n")
+        return None if end < 0 else self.cut(end + 1)[:-1].decode("latin-1")
 
 
-_INTERPRETER = re.compile(r"(ack: \d+: .*|discard: .*: .*|state: -?\d+: \w+)", re.DOTALL)
+class DashboardReader(LineReader):
+    """Answers after the greeting."""
+
+    is_greeted = False
+
+    def check(self, line):
+        assert len(line) <= MAX_LINE
+        assert "\r" not in line
+        if not self.is_greeted:
+            assert line == GREETING
+            self.is_greeted = True
+            return None
+        return line
 
 
-class InterpreterReader:
-    """Keeps the last lines."""
+class InterpreterReader(LineReader):
+    """Answers of interpreter mode."""
 
-    def __init__(self, version):
-        self.buffer = b""
-        self.answers = []
-
-    def feed(self, data):
-        *lines, self.buffer = (self.buffer + data).split(b"\n")
-        for line in lines:
-            text = line.decode("latin-1")
-            assert _INTERPRETER.fullmatch(text), text
-            self.answers.append(text)
-            del self.answers[:-50]
-
-    def finish(self):
-        assert not self.buffer
+    def check(self, line):
+        assert re.fullmatch(r"(ack: \d+: .*|discard: .*: .*|state: -?\d+: \w+)", line, re.DOTALL), line
+        return line
 
 
-class ModbusReader:
+# pymodbus's decoder of answers.
+_MODBUS = DecodePDU(is_server=False)
+
+
+class ModbusReader(Reader):
     """Takes answers apart; every one is a value, an echo or an exception."""
 
-    def __init__(self, version):
-        self.buffer = bytearray()
-        self.answers = []
+    def take(self):
+        return take_frame(self.buffer)
 
-    def feed(self, data):
-        self.buffer += data
-        while (frame := take_frame(self.buffer)) is not None:
-            function = frame.pdu[0]
-            assert function & 0x80 or function in (1, 2, 3, 4, 5, 6, 15, 16), frame
-            assert len(frame.pdu) == 2 if function & 0x80 else _MODBUS.decode(frame.pdu) is not None, frame
-            self.answers.append(frame)
-            del self.answers[:-50]
-
-    def finish(self):
-        assert not self.buffer
+    def check(self, frame):
+        function = frame.pdu[0]
+        assert function & 0x80 or function in (1, 2, 3, 4, 5, 6, 15, 16), frame
+        assert len(frame.pdu) == 2 if function & 0x80 else _MODBUS.decode(frame.pdu) is not None, frame
+        return frame
 
 
-class GripperReader:
+class GripperReader(Reader):
     """Looks at answers of a gripper: bare values have no end, so letters, digits and some signs are all there is."""
 
-    def __init__(self, version):
-        self.answers = []
+    def take(self):
+        return self.cut(len(self.buffer)) or None
 
-    def feed(self, data):
+    def check(self, data):
         assert re.fullmatch(rb"[A-Za-z0-9_.?, \[\]\n-]*", data), data
-        self.answers.append(data)
-        del self.answers[:-50]
-
-    def finish(self):
-        pass
 
 
-class ToolLineReader:
+class ToolLineReader(Reader):
     """Takes answers of the serial line apart by their checksums."""
 
-    def __init__(self, version):
-        self.buffer = bytearray()
-        self.answers = []
-
-    def feed(self, data):
-        self.buffer += data
-        for size in range(5, len(self.buffer) + 1):
-            if crc16(bytes(self.buffer[:size])) == 0:  # of a frame and its checksum
-                self.answers.append(bytes(self.buffer[:size]))
-                del self.buffer[:size]
-                del self.answers[:-50]
-                self.feed(b"")
-                break
-
-    def finish(self):
-        assert not self.buffer
+    def take(self):
+        sizes = (size for size in range(5, len(self.buffer) + 1) if crc16(bytes(self.buffer[:size])) == 0)
+        size = next(sizes, None)  # of a frame and its checksum
+        return None if size is None else self.cut(size)
 
 
 # An encoding or a version of HTTP that does not exist; every other one above 500 is a defect of the box.
@@ -279,33 +262,26 @@ NOT_OURS = (501, 505)
 _STATUS = re.compile(rb"HTTP/1\.1 (\d{3}) [\x20-\x7e]*\r\n")
 
 
-class HttpReader:
+class HttpReader(Reader):
     """Takes responses apart; each is JSON or a file, or says that the rest may be sent."""
 
-    def __init__(self, version):
-        self.buffer = b""
-        self.answers = []
+    def take(self):
+        head, end, _ = self.buffer.partition(b"\r\n\r\n")
+        if not end:
+            return None
+        match = _STATUS.match(head + b"\r\n")
+        assert match, head
+        status = int(match[1])
+        size = 0 if status in (100, 204) else int(re.search(rb"(?i)content-length: *(\d+)", head)[1])
+        whole = self.cut(len(head) + 4 + size)
+        return None if whole is None else (status, b"application/json" in head, whole[len(head) + 4 :])
 
-    def feed(self, data):
-        self.buffer += data
-        while b"\r\n\r\n" in self.buffer:
-            head, _, rest = self.buffer.partition(b"\r\n\r\n")
-            match = _STATUS.match(head + b"\r\n")
-            assert match, head
-            status = int(match[1])
-            size = 0 if status in (100, 204) else int(re.search(rb"(?i)content-length: *(\d+)", head)[1])
-            if len(rest) < size:
-                return
-            body, self.buffer = rest[:size], rest[size:]
-            if status == 100:
-                continue
-            assert status < 500 or status in NOT_OURS, (status, body)
-            is_json = b"application/json" in head
-            self.answers.append((status, json.loads(body) if is_json else body))
-            del self.answers[:-20]
-
-    def finish(self):
-        assert not self.buffer
+    def check(self, response):
+        status, is_json, body = response
+        if status == 100:
+            return None
+        assert status < 500 or status in NOT_OURS, (status, body)
+        return status, json.loads(body) if is_json else body
 
 
 READERS = {

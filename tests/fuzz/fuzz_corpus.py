@@ -3,6 +3,7 @@
 import json
 import struct
 import xmlrpc.client
+from pathlib import Path
 
 from protocol import robotiq
 from protocol.dashboard.commands import COMMANDS
@@ -32,57 +33,13 @@ from ur_emulator.machine.commands.operation import Kind
 MOVING_WORDS = {"set robotmode freedrive"}
 MOVING_OPERATIONS = {"push", "attach_payload"}
 
-STILL_PROGRAMS = (
-    'def hello():\n  textmsg("hello ", get_actual_joint_positions())\nend\n',
-    "def wait():\n  while True:\n    sync()\n  end\nend\n",
-    "def count():\n  global n = 0\n  while n < 20:\n    n = n + 1\n    sleep(0.02)\n  end\nend\n",
-    "def threads():\n  thread t():\n    while True:\n      set_digital_out(2, True)\n      sync()\n"
-    "    end\n  end\n  k = run t\n  sleep(0.1)\n  kill k\nend\n",
-    "sec beside():\n  set_standard_digital_out(1, True)\nend\n",
-    'def ask():\n  popup("really?", "title", blocking=True)\nend\n',
-    "def rtde():\n  write_output_integer_register(3, read_input_integer_register(3) + 1)\n"
-    "  write_output_float_register(3, read_input_float_register(3))\nend\n",
-    "def bad():\n  x = 1 / 0\nend\n",
-    "def list():\n  a = [1, 2, 3]\n  i = 0\n  while True:\n    a[i] = i\n    i = i + 1\n  end\nend\n",
-    'set_digital_out(0, True)\n',
-    'textmsg("line")\n',
-    "def labels():\n  $ 1 \"one\"\n  sleep(0.01)\n  $ 2 \"two\"\n  sleep(0.01)\nend\n",
-    "def halts():\n  halt\nend\n",
-    "def interprets():\n  while True:\n    interpreter_mode(clearQueueOnEnter=False)\n  end\nend\n",
-)  # fmt: skip
-# They dial a peer of the test; PEER stands for its port.
-DIALLING_PROGRAMS = (
-    'def floats():\n  socket_open("127.0.0.1", PEER)\n  while True:\n    textmsg(socket_read_ascii_float(3))\n'
-    "    sync()\n  end\nend\n",
-    'def integers():\n  socket_open("127.0.0.1", PEER, "a")\n  while True:\n'
-    '    x = socket_read_binary_integer(2, "a")\n    write_output_integer_register(1, x[0])\n  end\nend\n',
-    'def strings():\n  socket_open("127.0.0.1", PEER)\n  while True:\n'
-    '    textmsg(socket_read_string(prefix=">", suffix="<", timeout=0.1))\n    sync()\n  end\nend\n',
-    'def lines():\n  socket_open("127.0.0.1", PEER)\n  i = 0\n  while i < 50:\n'
-    '    socket_send_line("x")\n    textmsg(socket_read_line(timeout=0.05))\n    i = i + 1\n  end\n'
-    "  socket_close()\nend\n",
-    'def variables():\n  socket_open("127.0.0.1", PEER)\n  textmsg(socket_get_var("a"))\n'
-    '  socket_set_var("b", 3)\n  socket_send_int(7)\n  textmsg(socket_read_byte_list(5, timeout=0.1))\nend\n',
-    'def calls():\n  far = rpc_factory("xmlrpc", "http://127.0.0.1:PEER/")\n  while True:\n'
-    "    textmsg(far.value(1))\n  end\nend\n",
-    'def many():\n  i = 0\n  while i < 30:\n    socket_open("127.0.0.1", PEER, to_str(i))\n    i = i + 1\n'
-    "  end\n  sleep(0.1)\nend\n",
-)
-MOVING_PROGRAMS = (
-    "movej([0, -1.57, 1.57, 0, 0, 0], a=1.4, v=1.05)\n",
-    "speedj([0.1, 0, 0, 0, 0, 0.1], 1, 0.1)\n",
-    "speedl([0, 0, 0.05, 0, 0, 0], 1, 0.1)\n",
-    "stopj(2)\n",
-    "def move():\n  q = get_actual_joint_positions()\n  q[5] = q[5] + 0.2\n  movej(q, a=2, v=1)\n"
-    "  q[5] = q[5] - 0.2\n  movej(q, a=2, v=1, r=0.0)\nend\n",
-    "def servo():\n  q = get_actual_joint_positions()\n  i = 0\n  while i < 50:\n    q[5] = q[5] + 0.002\n"
-    "    servoj(q, t=0.008, lookahead_time=0.1, gain=300)\n    i = i + 1\n  end\n  stopj(2)\nend\n",
-    "def line():\n  p = get_actual_tcp_pose()\n  p[2] = p[2] + 0.02\n  movel(p, a=1, v=0.2)\nend\n",
-    "freedrive_mode()\n",
-    "def force():\n  force_mode(p[0,0,0,0,0,0], [0,0,1,0,0,0], [0,0,5,0,0,0], 2, [0.1,0.1,0.1,0.2,0.2,0.2])\n"
-    "  sleep(0.2)\n  end_force_mode()\nend\n",
-)
 
+def _programs(name):
+    """Return the programs of a file, which a line --- separates; before the first one is what they are."""
+    return tuple((Path(__file__).parent / "programs" / f"{name}.script").read_text().split("---\n")[1:])
+
+
+STILL_PROGRAMS, DIALLING_PROGRAMS, MOVING_PROGRAMS = map(_programs, ("still", "dialling", "moving"))
 
 # What port 30020 gets beside words; some hundred of the first kind are too many.
 STILL_STATEMENTS = (

@@ -22,7 +22,7 @@ from pathlib import Path
 import fuzz_mutations as mutations
 from dashboard_support import installation, urp
 from recording_samples import record_movement
-from urp_samples import SAMPLES as NODES
+from urp_samples import SAMPLES
 
 from pc_client.analysis.run import analyse_run
 from pc_client.control.controller import Controller
@@ -237,10 +237,10 @@ _CATALOGUE = CB3.software(CB3.parse_version(CB3.default_version)).catalogue
 
 @cache
 def _programs():
-    single = [urp(nodes) for nodes, _ in NODES.values()]
+    nodes = "".join(sample.nodes for sample in SAMPLES.values() if not sample.words)
     return (
-        *single,
-        *(urp("".join(nodes for nodes, _ in NODES.values()), once=once) for once in (True, False)),
+        *(sample.file() for sample in SAMPLES.values()),
+        *(urp(nodes, once=once) for once in (True, False)),
     )
 
 

@@ -120,10 +120,7 @@ def _change_element(rng, root):
         case 7:
             element.text = rng.choice(_TEXTS)
         case _:
-            steps = [
-                rng.choice(("..", "..", other.tag, f"{other.tag}[2]", ".", ""))
-                for _ in range(rng.randrange(1, 6))
-            ]
+            steps = rng.choices(("..", "..", other.tag, f"{other.tag}[2]", ".", ""), k=rng.randrange(1, 6))
             element.set("reference", "/".join(steps))
 
 
@@ -213,10 +210,8 @@ def mutate_mcap(rng, data):
                 record[1:9] = (rng.choice(_LENGTHS)).to_bytes(8, "little")
             case 3 if len(record) > 20:
                 size = rng.choice((2, 4, 8))
-                place = rng.randrange(9, len(record) - size)
-                record[place : place + size] = (rng.choice(_LENGTHS) & (256**size - 1)).to_bytes(
-                    size, "little"
-                )
+                place, value = rng.randrange(9, len(record) - size), rng.choice(_LENGTHS) % 256**size
+                record[place : place + size] = value.to_bytes(size, "little")
             case 4 if len(record) > 9:
                 record[:] = _with_length(record[:1], mutate_bytes(rng, bytes(record[9:])))
             case 5:
@@ -244,9 +239,8 @@ def _change_text(rng, record):
     if not texts:
         return
     one = rng.choice(texts)
-    new = rng.choice((*_TOML_VALUES, *_TEXTS, "NaN", "[[1, 2]]", "null", '{"a": 1}')).encode(
-        "utf-8", "replace"
-    )
+    texts = *_TOML_VALUES, *_TEXTS, "NaN", "[[1, 2]]", "null", '{"a": 1}'
+    new = rng.choice(texts).encode("utf-8", "replace")
     start, end = one.start() + 9, one.end() + 9
     for place in range(max(9, start - 400), start - 3):  # the length of the text around it
         size = int.from_bytes(record[place : place + 4], "little")
@@ -280,9 +274,8 @@ def mutate_zip(rng, data):
             name = info.filename
             if rng.random() < 0.2:
                 name = f"{rng.choice(_MEMBERS)}{number}.csv"
-            method = rng.choice(
-                (zipfile.ZIP_STORED, *[zipfile.ZIP_DEFLATED] * 5, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA)
-            )
+            methods = zipfile.ZIP_STORED, *[zipfile.ZIP_DEFLATED] * 5, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA
+            method = rng.choice(methods)
             if rng.random() < 0.05:
                 content, method = bytes(rng.choice((0, 1 << 16, 9 << 20))), zipfile.ZIP_DEFLATED
             made.writestr(zipfile.ZipInfo(name), content, method, compresslevel=1)

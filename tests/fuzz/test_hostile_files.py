@@ -10,7 +10,6 @@ import os
 import struct
 import tracemalloc
 import zipfile
-from collections.abc import Callable
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from zlib import crc32
 
@@ -39,11 +38,11 @@ from ur_hil.input_files import MIB
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def whole(tmp_path_factory):
     return record_movement(tmp_path_factory.mktemp("whole") / "a.mcap", duration=0.2, rest=0.1)
 
 
-def complaint(act: Callable[..., object], *arguments: object) -> str:
+def complaint(act, *arguments):
     """The line of the project's error, "" when there is none; any other error ends the test."""
     try:
         act(*arguments)
@@ -52,9 +51,7 @@ def complaint(act: Callable[..., object], *arguments: object) -> str:
     return ""
 
 
-def crafted(
-    *, topics=None, facts=None, compression="", rows=b"", schema=None, twice=False, size=None
-) -> bytes:
+def crafted(*, topics=None, facts=None, compression="", rows=b"", schema=None, twice=False, size=None):
     """A recording with parts that nobody wrote."""
     builder = RecordBuilder()
     builder.write(MAGIC)
@@ -117,15 +114,6 @@ CRAFTED = {
 }
 
 
-@pytest.mark.parametrize("name", CRAFTED)
-def test_a_crafted_recording_is_refused_in_one_line(tmp_path: Path, name: str) -> None:
-    path = tmp_path / "a.mcap"
-    path.write_bytes(CRAFTED[name])
-    line = complaint(load_recording, path) or load_recording(path).damage
-    assert line.isprintable()
-    assert line
-
-
 VALUES = (float("nan"), float("inf"), -float("inf"), 1e300, -1e300, 0.0, 5e-324)
 
 
@@ -136,33 +124,29 @@ VALUES = (float("nan"), float("inf"), -float("inf"), 1e300, -1e300, 0.0, 5e-324)
     value=st.sampled_from(VALUES),
     rows=st.sampled_from([slice(None), slice(20, 21), slice(10, 40, 2)]),
 )
-def test_values_that_no_robot_reports_are_refused(
-    whole: Path, signal: str, value: float, rows: slice
-) -> None:
+def test_values_that_no_robot_reports_are_refused(whole, signal, value, rows):
     recording = load_recording(whole)
     recording.column(signal)[rows] = value
     line = complaint(analyse_run, recording)
     assert line or value in (0.0, 5e-324)
 
 
-def test_one_bad_file_does_not_end_the_report_of_the_others(
-    tmp_path: Path, whole: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_one_bad_file_does_not_end_the_report_of_the_others(tmp_path, whole, capsys, monkeypatch):
     (tmp_path / "good_r1.mcap").write_bytes(whole.read_bytes())
     for number, data in enumerate(CRAFTED.values()):
         (tmp_path / f"bad_{number:02}.mcap").write_bytes(data)
     report = build_tables(tmp_path)
     assert len(report.table.runs) == 1
-    assert [line.split(":")[0] for line in report.left_out] == [
-        f"bad_{k:02}.mcap" for k in range(len(CRAFTED))
-    ]
+    names, reasons = zip(*(line.split(": ", 1) for line in report.left_out), strict=True)
+    assert list(names) == [f"bad_{k:02}.mcap" for k in range(len(CRAFTED))]
+    for name, reason in zip(CRAFTED, reasons, strict=True):
+        assert reason.isprintable(), name
+        assert "cannot be measured (" not in reason, name
     monkeypatch.setattr("pc_client.commands.recordings.show_report", lambda folder, **options: report)
     assert cli.run(["report", str(tmp_path)]) == 1
 
 
-def test_a_fault_of_ours_in_one_file_is_named_and_does_not_end_the_report(
-    tmp_path: Path, whole: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_fault_of_ours_in_one_file_is_named_and_does_not_end_the_report(tmp_path, whole, monkeypatch):
     for name in ("a", "b"):
         (tmp_path / f"{name}.mcap").write_bytes(whole.read_bytes())
 
@@ -175,14 +159,14 @@ def test_a_fault_of_ours_in_one_file_is_named_and_does_not_end_the_report(
     assert build_tables(tmp_path).left_out == ("a.mcap: cannot be measured (ZeroDivisionError: x\\x1b[2J)",)
 
 
-def test_recordings_that_cannot_be_read_are_not_overwritten(tmp_path: Path) -> None:
+def test_recordings_that_cannot_be_read_are_not_overwritten(tmp_path):
     path = tmp_path / "a.mcap"
     path.write_bytes(CRAFTED["wrong type of a number"])
     with pytest.raises(RecordingError, match="not overwritten"):
         _refuse_to_lose(path, overwrite=True)
 
 
-def test_a_file_beyond_its_limit_is_refused_before_it_is_in_memory(tmp_path: Path) -> None:
+def test_a_file_beyond_its_limit_is_refused_before_it_is_in_memory(tmp_path):
     path = tmp_path / "a.mcap"
     with path.open("wb") as file:
         file.truncate(8 << 30)  # of holes
@@ -195,7 +179,7 @@ def test_a_file_beyond_its_limit_is_refused_before_it_is_in_memory(tmp_path: Pat
             tracemalloc.stop()
 
 
-def test_only_regular_files_are_read(tmp_path: Path) -> None:
+def test_only_regular_files_are_read(tmp_path):
     os.mkfifo(tmp_path / "a.mcap")
     for path in (tmp_path / "a.mcap", tmp_path, Path("/dev/zero"), Path("a\0b")):
         with pytest.raises(RecordingError, match="cannot be read"):
@@ -205,19 +189,18 @@ def test_only_regular_files_are_read(tmp_path: Path) -> None:
 # ---- archives and pen recordings
 
 
-def zipped(path: Path, files: dict[str, bytes], method: int = zipfile.ZIP_DEFLATED) -> Path:
+def zipped(path, files, method=zipfile.ZIP_DEFLATED):
     with zipfile.ZipFile(path, "w", method, compresslevel=9) as archive:
         for name, content in files.items():
             archive.writestr(name, content)
     return path
 
 
-@pytest.mark.parametrize("lies", [False, True])
-def test_an_archive_that_bursts_is_unpacked_no_further_than_its_limit(tmp_path: Path, lies: bool) -> None:
+def test_an_archive_that_bursts_is_unpacked_no_further_than_its_limit(tmp_path):
+    """Both its heads say that the file is small; an honest one is in the corpus."""
     path = zipped(tmp_path / "a.zip", {"a.csv": bytes(64 * MIB), "b.csv": b"0,0,0\n1,1,1\n"})
-    if lies:  # say in both heads that the file is small
-        data = path.read_bytes()
-        path.write_bytes(data.replace(struct.pack("<I", 64 * MIB), struct.pack("<I", 1000)))
+    data = path.read_bytes()
+    path.write_bytes(data.replace(struct.pack("<I", 64 * MIB), struct.pack("<I", 1000)))
     tracemalloc.start()
     outcomes = list(contents(pen_sources([path])))
     assert tracemalloc.get_traced_memory()[1] < 4 * FILE_KINDS["pen"].most_bytes
@@ -226,20 +209,20 @@ def test_an_archive_that_bursts_is_unpacked_no_further_than_its_limit(tmp_path: 
     assert outcomes[1][1] == b"0,0,0\n1,1,1\n"
 
 
-def test_packing_methods_that_cannot_be_unpacked_piece_by_piece_are_refused(tmp_path: Path) -> None:
+def test_packing_methods_that_cannot_be_unpacked_piece_by_piece_are_refused(tmp_path):
     path = zipped(tmp_path / "a.zip", {"a.csv": bytes(MIB)}, zipfile.ZIP_BZIP2)
     ((_, content),) = contents(pen_sources([path]))
     assert "pack it by deflate" in str(content)
 
 
-def test_an_archive_of_too_much_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_archive_of_too_much_is_refused(tmp_path, monkeypatch):
     path = zipped(tmp_path / "a.zip", {f"{k}.csv": b"0,0,0" for k in range(4)})
     monkeypatch.setattr("pc_client.studies.extraction.pen.MOST_MEMBERS", 3)
     with pytest.raises(RecordingError, match=r"4 files of 0 MiB in all; allowed are 3"):
         pen_sources([path])
 
 
-def test_samples_of_a_pen_recording_are_counted() -> None:
+def test_samples_of_a_pen_recording_are_counted():
     with pytest.raises(RecordingError, match=f"more than {MOST_SAMPLES} samples"):
         parse_pen(b"0,0,0\n" * (MOST_SAMPLES + 1), "a.csv")
 
@@ -258,7 +241,7 @@ NO_NAMES = [
 
 
 @pytest.mark.parametrize("name", NO_NAMES)
-def test_a_name_never_leaves_the_folder_of_the_recordings(tmp_path: Path, name: str) -> None:
+def test_a_name_never_leaves_the_folder_of_the_recordings(tmp_path, name):
     path = tmp_path / "m.toml"
     path.write_text(LIBRARY.replace('"lognorm_4_1"', f'"{name}"'))
     with pytest.raises(MovementError, match="name"):
@@ -266,7 +249,7 @@ def test_a_name_never_leaves_the_folder_of_the_recordings(tmp_path: Path, name: 
 
 
 @given(name=st.text(max_size=120) | st.sampled_from(NO_NAMES))
-def test_a_name_that_is_taken_is_a_file_of_the_folder(name: str) -> None:
+def test_a_name_that_is_taken_is_a_file_of_the_folder(name):
     if is_file_name(name):
         assert PurePosixPath(name).parts == PureWindowsPath(name).parts == (name,)
         assert not PureWindowsPath(name).is_reserved()
@@ -274,7 +257,7 @@ def test_a_name_that_is_taken_is_a_file_of_the_folder(name: str) -> None:
     assert is_file_name(as_file_name(name, "drawing"))
 
 
-def test_a_movement_of_years_is_refused_before_it_is_planned(tmp_path: Path) -> None:
+def test_a_movement_of_years_is_refused_before_it_is_planned(tmp_path):
     path = tmp_path / "m.toml"
     lines = [("duration = 1e300" if line.startswith("duration") else line) for line in LIBRARY.splitlines()]
     path.write_text("\n".join(lines))
@@ -284,9 +267,12 @@ def test_a_movement_of_years_is_refused_before_it_is_planned(tmp_path: Path) -> 
 
 @pytest.mark.parametrize("reader", TOML_READERS)
 @pytest.mark.parametrize("text", ["x = " + "[" * 5000, "x = " + "9" * 5000, "\0", "a" + ".a" * 5000 + " = 1"])
-def test_toml_that_no_parser_likes(tmp_path: Path, reader: str, text: str) -> None:
+def test_toml_that_no_parser_likes(tmp_path, reader, text):
     with pytest.raises(ClientError):
         TARGETS[reader].read(text.encode(), tmp_path)
+
+
+KEYS = {"movement": "name", "cell": "name", "controller": "gain_p", "sweep": "movements"}
 
 
 @pytest.mark.parametrize("reader", TOML_READERS)
@@ -295,9 +281,8 @@ def test_toml_that_no_parser_likes(tmp_path: Path, reader: str, text: str) -> No
     [(".a" * 5000 + " = 1", 200 * MIB), (f" = 0x{'f' * 10_000}", 200 * MIB), (f" = [{'true, ' * 20_000}]", 40 * MIB)],
     ids=["nested", "long", "list"],
 )  # fmt: skip
-def test_a_key_with_a_monstrous_value(tmp_path: Path, reader: str, value: str, most: int) -> None:
-    for key in ("name", "movements", "gain_p"):
-        tracemalloc.start()
-        assert complaint(TARGETS[reader].read, f"{key}{value}".encode(), tmp_path).isprintable()
-        assert tracemalloc.get_traced_memory()[1] < most
-        tracemalloc.stop()
+def test_a_key_with_a_monstrous_value(tmp_path, reader, value, most):
+    tracemalloc.start()
+    assert complaint(TARGETS[reader].read, f"{KEYS[reader]}{value}".encode(), tmp_path).isprintable()
+    assert tracemalloc.get_traced_memory()[1] < most
+    tracemalloc.stop()

@@ -48,16 +48,6 @@ def test_one_frame_a_feed_and_several_waiting(bodies):
     assert drain(buffer) == frames
 
 
-def test_trailing_bytes_wait():
-    buffer = FrameBuffer(64)
-    buffer.feed(frame(b"abc") + b"\0\0")
-    assert buffer.next_frame() == frame(b"abc")
-    assert buffer.next_frame() is None
-    assert buffer.pending == 2
-    buffer.feed(b"\0\x05!")
-    assert buffer.next_frame() == frame(b"!")
-
-
 @pytest.mark.parametrize("size", [-1, 0, 3, 4, 65, 2**31 - 1])
 def test_absurd_lengths_are_refused_again_and_again(size):
     buffer = FrameBuffer(max_size=64, min_size=5)

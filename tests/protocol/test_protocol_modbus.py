@@ -3,6 +3,7 @@
 from contextlib import suppress
 
 import pytest
+from codec_ways import check_reading, taken_by
 from hypothesis import given
 from hypothesis import strategies as st
 from pymodbus.framer import FramerSocket
@@ -65,14 +66,7 @@ FRAMES = [
 def test_every_frame_by_four_methods(frame, data):
     data = bytes.fromhex(data)
     assert encode_frame(*frame) == data
-    inbox = bytearray(data)
-    assert (take_frame(inbox), inbox) == (frame, b"")
-    inbox = bytearray()
-    for byte in data[:-1]:
-        inbox.append(byte)
-        assert take_frame(inbox) is None
-    inbox += data[-1:] + b"\0\1\0"
-    assert (take_frame(inbox), inbox) == (frame, b"\0\1\0")
+    check_reading(lambda: taken_by(take_frame), data, [frame], trailing=b"\0\1\0")
 
 
 @pytest.mark.parametrize(
@@ -86,10 +80,8 @@ def test_what_is_no_frame_is_an_error(data):
 
 @given(st.binary(max_size=600))
 def test_any_bytes_are_frames_or_an_error(data):
-    inbox = bytearray(data)
     with suppress(RemoteProtocolError):
-        while (frame := take_frame(inbox)) is not None:
-            assert 1 <= len(frame.pdu) <= 253
+        assert all(1 <= len(frame.pdu) <= 253 for frame in taken_by(take_frame)(data))
 
 
 def request_of_pymodbus(function, address, values):

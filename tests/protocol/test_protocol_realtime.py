@@ -9,14 +9,8 @@ import numpy as np
 import pytest
 
 from protocol.errors import LocalProtocolError, RemoteProtocolError
-from protocol.realtime.layout import (
-    COLUMNS,
-    SNAPSHOT_FIELDS,
-    layout_for_size,
-    layout_for_version,
-)
+from protocol.realtime.layout import COLUMNS, SNAPSHOT_FIELDS, layout_for_size, layout_for_version
 from protocol.ur_types import SoftwareVersion
-from protocol.wire_record import ValueOrigin
 
 SIZES = [1044, 1060, 1108, 1116, 1140, 1220]
 
@@ -79,19 +73,6 @@ def test_offsets_are_those_of_the_sheet():
     assert [(c.name, layout.offset(c), (layout.offset(c) - 4) // 8 + 1) for c in layout.columns] == SHEET
 
 
-def test_column_names_are_unique_identifiers():
-    attributes = [column.attribute for column in COLUMNS]
-    assert len(set(attributes)) == len(attributes)
-    assert all(attribute.isidentifier() for attribute in attributes)
-    assert not {"values", "names", "layout"} & set(attributes)
-
-
-def test_snapshot_fields_are_all_columns_but_the_internal_ones():
-    internal = {c.attribute for c in COLUMNS if c.origin is ValueOrigin.INTERNAL_ZERO}
-    assert internal == {"test_value"} | {c.attribute for c in COLUMNS if c.name.startswith("internal_")}
-    assert set(SNAPSHOT_FIELDS) == {c.attribute for c in COLUMNS} - internal
-
-
 @pytest.mark.parametrize("size", SIZES)
 def test_what_is_written_is_read(size):
     snapshot = numbered_snapshot()
@@ -107,20 +88,15 @@ def test_what_is_written_is_read(size):
         assert np.array_equal(value, expected)
 
 
-def test_bytes_are_big_endian_doubles_after_the_length():
-    data = layout_for_size(1140).encoder()(numbered_snapshot())
-    assert struct.unpack_from(">i", data) == (1140,)
-    assert struct.unpack_from(">7d", data, 4) == (1.0, 2.0, 2.01, 2.02, 2.03, 2.04, 2.05)
-    assert data[820:868] == bytes(48)  # internal
-
-
-def test_bits_and_modes_travel_as_doubles():
+def test_bytes_are_big_endian_doubles_after_the_length_bits_and_modes_too():
     snapshot = numbered_snapshot()
-    snapshot.actual_digital_input_bits = 0b101
-    snapshot.robot_mode = 7
+    snapshot.actual_digital_input_bits, snapshot.robot_mode = 0b101, 7
     data = layout_for_size(1140).encoder()(snapshot)
     assert data[684:692].hex() == "4014000000000000"  # 5.0: bits 0 and 2
     assert data[756:764].hex() == "401c000000000000"
+    assert struct.unpack_from(">i", data) == (1140,)
+    assert struct.unpack_from(">7d", data, 4) == (1.0, 2.0, 2.01, 2.02, 2.03, 2.04, 2.05)
+    assert data[820:868] == bytes(48)  # internal
 
 
 def test_a_frame_is_read_only_and_its_vectors_are_views():

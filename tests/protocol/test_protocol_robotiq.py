@@ -3,21 +3,14 @@
 from contextlib import suppress
 
 import pytest
+from codec_ways import in_pieces, taken_by
 from hypothesis import given
 from hypothesis import strategies as st
 
 from protocol import modbus, robotiq
 from protocol.errors import RemoteProtocolError
 from protocol.modbus_rtu import crc16, decode_read_write, encode_rtu, take_request
-from protocol.robotiq import (
-    Get,
-    GripperConnection,
-    Malformed,
-    Set,
-    encode_request,
-    encode_value,
-    take_answer,
-)
+from protocol.robotiq import Get, GripperConnection, Malformed, Set, encode_request, encode_value, take_answer
 
 STREAM = (
     (b"SET POS 100 SPE 255 FOR 10 GTO 1\n", Set((("POS", 100), ("SPE", 255), ("FOR", 10), ("GTO", 1)))),
@@ -97,12 +90,8 @@ def test_a_client_asks_and_takes_the_answer_whole_bytewise_and_before_others(req
     for others in (b"", b"ack", b"STA 3\n"):
         inbox = bytearray(answer + others)
         assert (take_answer(inbox, request_), inbox) == (value, others)
-    inbox = bytearray()
-    for byte in answer[:-1]:
-        inbox.append(byte)
-        assert take_answer(inbox, request_) is None
-    inbox.append(answer[-1])
-    assert take_answer(inbox, request_) == value
+    take = taken_by(lambda inbox: take_answer(inbox, request_))
+    assert in_pieces(take, answer, 1) == [value]
 
 
 @given(st.binary(max_size=3000), st.sampled_from([request for request, *_ in ASKED]))
@@ -129,17 +118,10 @@ REQUESTS = (
 def test_requests_of_the_serial_line_are_taken_whole_bytewise_and_with_others_behind_them():
     frames = [bytes.fromhex(text) for text in REQUESTS]
     for frame in frames:
-        inbox, taken = bytearray(), []
-        for byte in frame:
-            assert not taken
-            inbox.append(byte)
-            if (request := take_request(inbox)) is not None:
-                taken.append(request)
-        assert taken == [(9, frame[1:-2])]
-        assert encode_rtu(*taken[0]) == frame
-    inbox = bytearray(b"".join(frames))
-    assert [take_request(inbox) for _ in frames] == [(9, frame[1:-2]) for frame in frames]
-    assert not inbox
+        request = (9, frame[1:-2])
+        assert encode_rtu(*request) == frame
+        assert in_pieces(taken_by(take_request), frame, 1) == [request]
+    assert taken_by(take_request)(b"".join(frames)) == [(9, frame[1:-2]) for frame in frames]
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ from itertools import chain
 from types import SimpleNamespace
 
 import pytest
+from codec_ways import check_reading
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -58,34 +59,22 @@ def test_every_output_is_filled():
 @pytest.mark.parametrize(
     ("name", "first", "before"),
     [
-        ("timestamp", (3, 3), None),
-        ("output_int_register_0", (3, 4), (3, 3)),
-        ("elbow_position", (3, 5), (3, 4)),
-        ("output_int_register_24", (3, 9), (3, 8)),
-        ("safety_status", (3, 10), (3, 9)),
-        ("payload", (3, 11), (3, 10)),
-        ("tcp_offset", (3, 12, 3), (3, 12, 2)),
-        ("script_control_line", (3, 14), (3, 13)),
-        ("payload_inertia", (3, 15), (3, 14)),
-        ("ft_raw_wrench", (5, 9), (3, 15)),
-        ("elbow_position", (5, 0), None),
-        ("output_int_register_24", (5, 3), (5, 2)),
-        ("safety_status", (5, 4), (5, 3)),
-        ("payload", (5, 5, 1), (5, 5, 0)),
-        ("tcp_offset", (5, 5, 1), (5, 5, 0)),
-        ("script_control_line", (5, 9), (5, 8)),
-        ("ft_raw_wrench", (5, 9), (5, 8)),
-        ("payload_inertia", (5, 11), (5, 10)),
-        ("joint_position_deviation_ratio", (5, 11), (5, 10)),
-        ("encoder1_raw", (5, 14), (3, 15)),
-        ("time_scale_source", (5, 19), (5, 15)),
-        ("collision_detection_ratio", (5, 19), (5, 15)),
+        ("timestamp", (3, 3), None), ("output_int_register_0", (3, 4), (3, 3)),
+        ("elbow_position", (3, 5), (3, 4)), ("output_int_register_24", (3, 9), (3, 8)),
+        ("safety_status", (3, 10), (3, 9)), ("payload", (3, 11), (3, 10)),
+        ("tcp_offset", (3, 12, 3), (3, 12, 2)), ("script_control_line", (3, 14), (3, 13)),
+        ("payload_inertia", (3, 15), (3, 14)), ("ft_raw_wrench", (5, 9), (3, 15)),
+        ("elbow_position", (5, 0), None), ("output_int_register_24", (5, 3), (5, 2)),
+        ("safety_status", (5, 4), (5, 3)), ("payload", (5, 5, 1), (5, 5, 0)),
+        ("tcp_offset", (5, 5, 1), (5, 5, 0)), ("script_control_line", (5, 9), (5, 8)),
+        ("ft_raw_wrench", (5, 9), (5, 8)), ("payload_inertia", (5, 11), (5, 10)),
+        ("joint_position_deviation_ratio", (5, 11), (5, 10)), ("encoder1_raw", (5, 14), (3, 15)),
+        ("time_scale_source", (5, 19), (5, 15)), ("collision_detection_ratio", (5, 19), (5, 15)),
         ("actual_robot_energy_consumed", (5, 23), (5, 22, 2)),
-        ("actual_current_as_torque", (5, 23), (5, 22, 9)),
-        ("target_gravity", (5, 26), (5, 25, 1)),
+        ("actual_current_as_torque", (5, 23), (5, 22, 9)), ("target_gravity", (5, 26), (5, 25, 1)),
         ("control_step", (5, 26), (5, 25, 1)),
     ],
-)
+)  # fmt: skip
 def test_first_version_of_a_variable(name, first, before):
     assert name in output_fields(SoftwareVersion(*first))
     if before:
@@ -122,29 +111,16 @@ PACKAGES = [
     (ROBOT, 1, M.RequestProtocolVersionReply(True), "00 04 56 01"),
     (ROBOT, 2, M.RequestProtocolVersionReply(False), "00 04 56 00"),
     (PC, 2, M.GetControllerVersion(), "00 03 76"),
-    (
-        ROBOT,
-        2,
-        M.GetControllerVersionReply(SoftwareVersion(3, 15, 8, 106339)),
-        "00 13 76 00000003 0000000f 00000008 00019f63",
-    ),
-    (
-        PC,
-        2,
-        M.SetupOutputs(("timestamp", "actual_q"), 125.0),
-        "00 1d 4f 40 5f 40 00 00 00 00 00" + b"timestamp,actual_q".hex(),
-    ),
-    (PC, 1, M.SetupOutputs(("timestamp",)), "00 0c 4f" + b"timestamp".hex()),
-    (
-        ROBOT,
-        2,
-        M.SetupOutputsReply(("DOUBLE", "VECTOR6D"), 1),
-        "00 13 4f 01" + b"DOUBLE,VECTOR6D".hex(),
-    ),
-    (ROBOT, 1, M.SetupOutputsReply(("DOUBLE",)), "00 09 4f" + b"DOUBLE".hex()),
-    (PC, 2, M.SetupInputs(("input_int_register_0",)), "00 17 49" + b"input_int_register_0".hex()),
+    (ROBOT, 2, M.GetControllerVersionReply(SoftwareVersion(3, 15, 8, 106339)),
+     "00 13 76 00000003 0000000f 00000008 00019f63"),
+    (PC, 2, M.SetupOutputs(("timestamp", "actual_q"), 125.0),
+     f"00 1d 4f 40 5f 40 00 00 00 00 00 {b'timestamp,actual_q'.hex()}"),
+    (PC, 1, M.SetupOutputs(("timestamp",)), f"00 0c 4f {b'timestamp'.hex()}"),
+    (ROBOT, 2, M.SetupOutputsReply(("DOUBLE", "VECTOR6D"), 1), f"00 13 4f 01 {b'DOUBLE,VECTOR6D'.hex()}"),
+    (ROBOT, 1, M.SetupOutputsReply(("DOUBLE",)), f"00 09 4f {b'DOUBLE'.hex()}"),
+    (PC, 2, M.SetupInputs(("input_int_register_0",)), f"00 17 49 {b'input_int_register_0'.hex()}"),
     (PC, 2, M.SetupInputs(()), "00 03 49"),
-    (ROBOT, 2, M.SetupInputsReply(("IN_USE",), 0), "00 0a 49 00" + b"IN_USE".hex()),
+    (ROBOT, 2, M.SetupInputsReply(("IN_USE",), 0), f"00 0a 49 00 {b'IN_USE'.hex()}"),
     (ROBOT, 1, M.SetupInputsReply((), 7), "00 04 49 07"),
     (PC, 2, M.Start(), "00 03 53"),
     (ROBOT, 2, M.StartReply(True), "00 04 53 01"),
@@ -158,41 +134,42 @@ PACKAGES = [
     (PC, 1, M.DataPackage(DOUBLE, 1), "00 0c 55 01 3ff8000000000000"),
     (ROBOT, 2, M.DataPackage(DOUBLE, 1), "00 0c 55 01 3ff8000000000000"),
     (ROBOT, 1, M.DataPackage(DOUBLE), "00 0b 55 3ff8000000000000"),
-]
+]  # fmt: skip
 IDS = [f"{sender.value}-v{version}-{type(message).__name__}" for sender, version, message, _ in PACKAGES]
 
 
 @pytest.mark.parametrize(("sender", "version", "message", "golden"), PACKAGES, ids=IDS)
-def test_written(sender, version, message, golden):
-    assert encode_message(message, sender, version) == bytes.fromhex(golden)
-
-
-@pytest.mark.parametrize(("sender", "version", "message", "golden"), PACKAGES, ids=IDS)
-def test_read(sender, version, message, golden):
+def test_packages_are_written_and_read(sender, version, message, golden):
     data = bytes.fromhex(golden)
+    assert encode_message(message, sender, version) == data
     assert int.from_bytes(data[:2], "big") == len(data)
     assert decode_message(data[2], data[HEADER_SIZE:], sender, version) == message
+
+
+def server(version):
+    """Return a function that gives a connection of the robot bytes, and returns the requests that it answers."""
+    robot = RtdeServerConnection(V3_15, output_fields(V3_15), input_fields(V3_15))
+    robot.protocol_version = version
+
+    def feed(data):
+        robot.receive_data(data)
+        requests = []
+        while (request := robot.next_event()) is not None:
+            requests.append(request)
+            robot.reply()
+        return requests
+
+    return feed
 
 
 REQUESTS = [row for row in PACKAGES if row[0] is PC and type(row[2]) in M.REQUESTS]
 
 
-@pytest.mark.parametrize("step", [1, 2, 7, None])
-@pytest.mark.parametrize("trailing", [b"", b"\0", b"\0\3S"])
 @pytest.mark.parametrize(("sender", "version", "message", "golden"), REQUESTS)
-def test_read_from_a_stream_bytewise_and_with_trailing_data(sender, version, message, golden, step, trailing):
-    connection = RtdeServerConnection(
-        SoftwareVersion(3, 15), output_fields(SoftwareVersion(3, 15)), input_fields(SoftwareVersion(3, 15))
-    )
-    connection.protocol_version = version
-    data = bytes.fromhex(golden) + trailing
-    found = []
-    for start in range(0, len(data), step or len(data)):
-        connection.receive_data(data[start : start + (step or len(data))])
-        while (event := connection.next_event()) is not None:
-            found.append(event)
-            connection.reply()
-    assert found == [message, M.Start()][: 1 + (len(trailing) == 3)]
+def test_read_from_a_stream_bytewise_and_with_trailing_data(sender, version, message, golden):
+    data = bytes.fromhex(golden)
+    check_reading(lambda: server(version), data, [message], trailing=b"\0")
+    check_reading(lambda: server(version), data + b"\0\3S", [message, M.Start()])
 
 
 @pytest.mark.parametrize(("sender", "version", "message", "golden"), PACKAGES, ids=IDS)

@@ -3,17 +3,11 @@
 from __future__ import annotations
 
 import pytest
+from codec_ways import check_reading, in_pieces
 from hypothesis import given
 from hypothesis import strategies as st
 
-from protocol.script_channel import (
-    CONTROLLER_WORDS,
-    MAX_LINE,
-    ControlLine,
-    Overflow,
-    ProgramText,
-    ScriptChannel,
-)
+from protocol.script_channel import MAX_LINE, ControlLine, Overflow, ProgramText, ScriptChannel
 
 NESTED = """\
 def outer():
@@ -111,26 +105,14 @@ CASES = [
 ]  # fmt: skip
 
 
-def split(channel, data, size):
-    items = []
-    for start in range(0, len(data), size):
-        items += channel.feed(data[start : start + size])
-    return items
-
-
-@pytest.mark.parametrize("size", [1, 7, 1 << 20], ids=["bytewise", "by 7", "whole"])
 @pytest.mark.parametrize(("text", "items"), [case[1:] for case in CASES], ids=[case[0] for case in CASES])
-def test_cases(text, items, size):
+def test_cases_alone_and_followed_by_half_a_program(text, items):
+    data, rest = text.encode("latin-1"), b"def late():\n  sync()\nen"
+    check_reading(lambda: ScriptChannel().feed, data, items, trailing=rest)
     channel = ScriptChannel()
-    assert split(channel, text.encode("latin-1"), size) == items
+    assert channel.feed(data) == items
     assert channel.pending == 0
-
-
-@pytest.mark.parametrize(("text", "items"), [case[1:] for case in CASES], ids=[case[0] for case in CASES])
-def test_cases_followed_by_half_a_program(text, items):
-    channel = ScriptChannel()
-    rest = b"def late():\n  sync()\nen"
-    assert channel.feed(text.encode("latin-1") + rest) == items
+    assert channel.feed(rest) == []
     assert channel.pending == len(rest)
     assert channel.feed(b"d\n") == [ProgramText("def late():\n  sync()\nend\n", "late", "def")]
 
@@ -141,13 +123,6 @@ def test_without_the_last_newline_nothing_runs():
     assert channel.feed(b"def a():\n end") == [
         ProgramText("movej([0,0,0,0,0,0])def a():\n", "movej", "statement")
     ]
-
-
-def test_every_word_of_the_table_is_recognised():
-    for word in CONTROLLER_WORDS:
-        line = f"{word.text} 0.25" if word.takes_number else word.text
-        (item,) = ScriptChannel().feed(line.encode() + b"\n")
-        assert item == ControlLine(line, word.text, "0.25" if word.takes_number else "")
 
 
 PIECES = st.sampled_from(
@@ -185,7 +160,7 @@ def test_whatever_came_before_a_control_word_is_heard_and_the_next_program_runs(
 def test_a_line_that_is_too_long_is_dropped_and_said_once(size):
     channel = ScriptChannel(max_line=100)
     data = b"a" * 1000 + b"\nsync()\n" + b"b" * 100 + b"\n"
-    items = split(channel, data, size)
+    items = in_pieces(channel.feed, data, size)
     assert items == [
         Overflow("line", 100),
         ProgramText("sync()\n", "sync", "statement"),
@@ -199,15 +174,13 @@ def test_the_body_of_a_dropped_program_does_not_run_line_by_line(size):
     body = (
         b"def a():\n  movej(q1)\n  x = [" + b"1," * 100 + b"]\nmovej(q2)\n  if x:\n  end\nend_teach_mode()\n"
     )
-    assert split(channel, body + b"end\nsync()\n", size) == [
+    assert in_pieces(channel.feed, body + b"end\nsync()\n", size) == [
         Overflow("line", 100),
         ProgramText("sync()\n", "sync", "statement"),
     ]
     # if its end never comes, the next program still does
-    assert split(channel, body + b"def b():\nend\n", size) == [
-        Overflow("line", 100),
-        ProgramText("def b():\nend\n", "b", "def"),
-    ]
+    later = [Overflow("line", 100), ProgramText("def b():\nend\n", "b", "def")]
+    assert in_pieces(channel.feed, body + b"def b():\nend\n", size) == later
 
 
 def test_a_program_that_is_too_long_is_dropped():
@@ -223,7 +196,7 @@ def test_megabytes_without_a_newline_are_bounded_and_cheap(unit):
     # quadratic scanning would need hours here; pytest's timeout is the judge
     channel = ScriptChannel()
     data = unit * (3_000_000 // len(unit))
-    items = split(channel, data, 4096)
+    items = in_pieces(channel.feed, data, 4096)
     assert items == [Overflow("line", MAX_LINE)]
     assert channel.pending == 0
     line = unit * (MAX_LINE // len(unit) - 1)

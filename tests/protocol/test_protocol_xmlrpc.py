@@ -45,9 +45,8 @@ def read(*pieces, most=10_000):
 
 
 def answer(inside):
-    return (
-        f"<methodResponse><params><param><value>{inside}</value></param></params></methodResponse>".encode()
-    )
+    text = f"<methodResponse><params><param><value>{inside}</value></param></params></methodResponse>"
+    return text.encode()
 
 
 @given(VALUES, st.integers(1, 50))
@@ -56,13 +55,9 @@ def test_answers_of_the_standard_library(value, size):
     assert read(*(data[i : i + size] for i in range(0, len(data), size))) == value
 
 
-@given(st.lists(VALUES, max_size=4))
-def test_calls_that_the_standard_library_reads(arguments):
-    assert xmlrpc.client.loads(encode_call("work", arguments)) == (tuple(arguments), "work")
-
-
 @given(st.lists(VALUES, max_size=4), st.integers(1, 50))
 def test_calls_are_read_whole_and_in_pieces_and_not_with_others_behind_them(arguments, size):
+    assert xmlrpc.client.loads(encode_call("work", arguments)) == (tuple(arguments), "work")
     for data in (encode_call("work", arguments), xmlrpc.client.dumps(tuple(arguments), "work").encode()):
         reader = CallReader(10_000)
         for i in range(0, len(data), size):
@@ -83,14 +78,7 @@ def test_a_fault():
         read(xmlrpc.client.dumps(xmlrpc.client.Fault(3, "no paper")).encode())
 
 
-@pytest.mark.parametrize(
-    "data",
-    [
-        b"<methodResponse><params></params></methodResponse>",
-        b"<methodResponse><params/></methodResponse>",
-        answer("<nil/>"),
-    ],
-)
+@pytest.mark.parametrize("data", [b"<methodResponse><params/></methodResponse>", answer("<nil/>")])
 def test_what_has_no_value_is_none(data):
     assert read(data) is None
 

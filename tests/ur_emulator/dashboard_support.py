@@ -63,11 +63,15 @@ class Dashboard:
             return True
 
 
-def expression(text):
-    """An expression as PolyScope keeps it: one element a character."""
+def expression_chars(text):
+    """A text in an expression, as PolyScope keeps it: one element a character."""
     quote = {"&": "&amp;", '"': "&quot;", "<": "&lt;"}
-    chars = "".join(f'<ExpressionChar character="{quote.get(c, c)}"/>' for c in text)
-    return f"<expression>{chars}</expression>"
+    return "".join(f'<ExpressionChar character="{quote.get(c, c)}"/>' for c in text)
+
+
+def expression(text):
+    """An expression that is a text."""
+    return f"<expression>{expression_chars(text)}</expression>"
 
 
 def script_line(text):

@@ -7,48 +7,29 @@ import numpy as np
 import pytest
 from box_support import BareBox, FakeConnection
 from e_series_support import ESeriesBench
+from finger_support import PERIOD, DrivenFingers, ask, program_file, tool_box
 
 from protocol.robotiq import Fault, Objects, Status
 from protocol.ur_types import SoftwareVersion
-from ur_emulator import ControlBox
 from ur_emulator.errors import ArgumentError, ModelError, RefusedError
 from ur_emulator.host.ports.robotiq import RobotiqPort
 from ur_emulator.host.ports.tool_line import ToolLinePort
-from ur_emulator.machine.controller.io.lines import InputOutput
 from ur_emulator.machine.models.generations import E_SERIES
 from ur_emulator.machine.models.robots import robot_by_name
 from ur_emulator.machine.models.things import Thing
 from ur_emulator.machine.motion.generators import JointTarget
-from ur_emulator.machine.plant.hand import FingerCommand, FingerState
+from ur_emulator.machine.plant.hand import FingerCommand
 from ur_emulator.machine.plant.plant import Plant
 from ur_emulator.machine.plant.scene import load_scene
 from ur_emulator.machine.tools.robotiq import RobotiqGripper
 from ur_hil.tools import TOOLS, tools_by_name
 
-PERIOD = 0.008
 HAND = TOOLS["robotiq-2f85"]
 
 
-class Fingers:
-    """A gripper whose fingers move as they are driven; `block` is in their way [m]."""
-
+class Fingers(DrivenFingers):
     def __init__(self):
-        self.gripper = RobotiqGripper(HAND, PERIOD)
-        self.width, self.block = 0.04, 0.0
-        self.has_power, self.io = True, InputOutput()
-        self._speed = self._share = 0.0
-
-    def run(self, seconds):
-        for _ in range(round(seconds / PERIOD)):
-            state = FingerState(self.width, self._speed, self._share)
-            command = self.gripper.step(state, self.has_power, self.io)
-            self._speed = self._share = 0.0
-            if command is not None:
-                most = command.speed * PERIOD
-                wanted = self.width + max(-most, min(most, command.width - self.width))
-                stopped = max(wanted, min(self.block, self.width))
-                self._speed, self._share = (stopped - self.width) / PERIOD, -float(stopped > wanted)
-                self.width = stopped
+        super().__init__(RobotiqGripper(HAND, PERIOD), width=0.04)
 
     def set(self, **values):
         self.gripper.set(*values.items())
@@ -303,6 +284,10 @@ def test_a_tool_of_a_file(tmp_path):
     path.write_text('based_on = "robotiq-2f85"\nmass = 0.5\nstroke = 0.04\n')
     (tool,) = tools_by_name(str(path), ModelError)
     assert (tool.name, tool.mass, tool.stroke, tool.counts) == ("small", 0.5, 0.04, (3, 230))
+    with pytest.raises(
+        ModelError, match=r"unknown tool 'hand': choose one of none, robotiq-2f85, .* or give FILE"
+    ):
+        tools_by_name("hand", ModelError)
 
 
 @pytest.mark.parametrize(
@@ -321,26 +306,12 @@ def test_a_wrong_file_of_a_tool_is_one_line(tmp_path, text, said):
         tools_by_name(str(path), ModelError)
 
 
-def test_an_unknown_tool_is_named_with_those_that_are():
-    with pytest.raises(
-        ModelError, match=r"unknown tool 'hand': choose one of none, robotiq-2f85, .* or give FILE"
-    ):
-        tools_by_name("hand", ModelError)
-
-
 # --- from outside, and from programs
-
-
-def ask(client, text):
-    client.sendall(text.encode())
-    return client.recv(1000).decode()
 
 
 @pytest.fixture(scope="module")
 def box():
-    with ControlBox(
-        "ur5e", in_process=True, pace="lockstep", port_base=None, seed=7, tool="robotiq-2f85"
-    ) as box:
+    with tool_box("robotiq-2f85") as box:
         yield box
 
 
@@ -384,40 +355,9 @@ def test_a_client_activates_calibrates_and_moves_it(client):
     assert ask(client, "GET POS\n") == "POS ?\n"
 
 
-PROGRAM = """
-def p():
-  socket_open("127.0.0.1", 63352, "g")
-  socket_send_string("GET SID", "g")
-  textmsg("sid ", socket_read_byte_list(5, "g", 0.1))
-  socket_set_var("ACT", 1, "g")
-  textmsg("ack ", socket_read_byte_list(3, "g"))
-  while socket_get_var("STA", "g") != 3:
-    sync()
-  end
-  socket_send_string("SET POS", "g")
-  socket_send_byte(32, "g")
-  socket_send_string(255, "g")
-  socket_send_line(" GTO 1", "g")
-  socket_read_byte_list(3, "g")
-  still = get_tool_current()
-  sleep(0.3)
-  textmsg("mA ", floor(1000 * (get_tool_current() - still) + 0.5))
-  sleep(1.0)
-  socket_send_string("GET PRE", "g")
-  textmsg("pre ", socket_read_byte_list(3, "g"))
-  textmsg("pos ", socket_get_var("POS", "g"))
-  set_tool_voltage(0)
-  sleep(0.1)
-  socket_send_string("GET SID", "g")
-  textmsg("sid ", socket_read_byte_list(2, "g"))
-  set_tool_voltage(24)
-end
-"""
-
-
 def test_a_program_reaches_it_at_its_usual_port(box):
     said = len(box.log)
-    box.run_program(PROGRAM, wait=True)
+    box.run_program(program_file("gripper_socket"), wait=True)
     texts = [entry.text for entry in box.log[said:] if entry.source == "Program"]
     assert [text for text in texts if text[:3] in ("sid", "ack", "mA ", "pre", "pos")] == [
         "sid [3,91,57,93,-1,-1]",
@@ -524,9 +464,7 @@ def test_people_put_move_and_remove_things(box):
 
 
 def test_an_exact_arm_moves_its_fingers_and_has_no_things():
-    with ControlBox(
-        in_process=True, pace="lockstep", port_base=None, fidelity="exact", tool="robotiq-hande"
-    ) as box:
+    with tool_box("robotiq-hande", robot="ur3", fidelity="exact") as box:
         with pytest.raises(RefusedError, match="nothing acts on an arm of fidelity exact"):
             box.add_thing("ball", "sphere", (0.03,), 0.1, (0.5, 0.5, 0.2, 0.0, 0.0, 0.0))
         with socket.create_connection((box.host, box.ports.gripper), timeout=10.0) as client:
@@ -540,35 +478,13 @@ def test_an_exact_arm_moves_its_fingers_and_has_no_things():
 # --- a cup
 
 
-CUP_PROGRAM = """
-def p():
-  set_tcp(p[0, 0, 0.12, 0, 0, 0])
-  set_payload(0.5, [0, 0, 0.04])
-  there = p[0.5, 0.2, 0.022, 3.14159, 0, 0]
-  above = pose_trans(there, p[0, 0, -0.1, 0, 0, 0])
-  movej(get_inverse_kin(above), a=1.0, v=0.8)
-  set_tool_digital_out(0, True)
-  sleep(0.5)
-  textmsg("in the air ", get_tool_digital_in(0))
-  movel(there, a=0.5, v=0.1)
-  while not get_tool_digital_in(0):
-    sync()
-  end
-  movel(above, a=0.5, v=0.2)
-  sleep(0.5)
-  textmsg("carried ", get_tool_digital_in(0))
-  set_tool_digital_out(0, False)
-  sleep(0.5)
-  textmsg("let go ", get_tool_digital_in(0))
-end
-"""
-
-
-@pytest.mark.parametrize(("mass", "carried"), [(0.5, "True"), (8.0, "False")])
+@pytest.mark.parametrize(
+    ("mass", "carried"), [(0.5, "True"), pytest.param(8.0, "False", marks=pytest.mark.nightly)]
+)
 def test_a_cup_lifts_what_it_can_hold_and_reports_its_vacuum(mass, carried):
-    with ControlBox("ur5e", in_process=True, pace="lockstep", port_base=None, seed=7, tool="vacuum") as box:
+    with tool_box("vacuum") as box:
         box.add_thing("plate", "box", (0.1, 0.1, 0.04), mass, (0.5, 0.2, 0.0, 0.0, 0.0, 0.0))
-        box.run_program(CUP_PROGRAM, wait=True)
+        box.run_program(program_file("gripper_cup"), wait=True)
         texts = [entry.text for entry in box.log if entry.source == "Program"]
         assert texts[1:4] == ["in the air False", f"carried {carried}", "let go False"]
         assert box.state.things[0].pose[2] < 0.01
@@ -577,13 +493,7 @@ def test_a_cup_lifts_what_it_can_hold_and_reports_its_vacuum(mass, carried):
 
 def test_two_grippers_on_a_flange_are_reached_by_their_numbers():
     with (
-        ControlBox(
-            "ur5e",
-            in_process=True,
-            pace="lockstep",
-            port_base=None,
-            tool="robotiq-2f85,robotiq-hande",
-        ) as box,
+        tool_box("robotiq-2f85,robotiq-hande") as box,
         socket.create_connection((box.host, box.ports.gripper), timeout=10.0) as first,
         socket.create_connection((box.host, box.ports.gripper), timeout=10.0) as second,
     ):
@@ -599,6 +509,7 @@ def test_two_grippers_on_a_flange_are_reached_by_their_numbers():
 # --- a scene
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "scene.toml"
+IN_THE_WAY = "the arm is where something should stand"
 MJCF = """<mujoco>
   <worldbody>
     <geom name="shelf" type="box" size="0.1 0.1 0.05" pos="0.5 0.3 0.03"/>
@@ -624,8 +535,7 @@ def test_a_cell_file_is_the_scene_of_a_box_and_the_surroundings_of_a_plan():
     assert plant.physics.scene.names == ("block", "can")
     assert plant.physics.scene.state("block").pose[2] == pytest.approx(0.0, abs=1e-3)  # on the floor
     assert plant.physics.scene.state("can").pose[2] == pytest.approx(0.13, abs=1e-3)  # on the shelf
-    cell = load_scene(EXAMPLE)
-    assert [solid.name for solid in cell.solids] == ["shelf"]
+    assert [solid.name for solid in load_scene(EXAMPLE).solids] == ["shelf"]
 
 
 def test_a_fragment_of_mjcf_is_a_scene(tmp_path):
@@ -640,37 +550,23 @@ def test_a_fragment_of_mjcf_is_a_scene(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("name", "text", "said"),
+    ("name", "text", "error", "said"),
     [
-        ("a.xml", "<mujoco><worldbody><geom/></worldbody></mujoco>", "a.xml: .*; give a file of MJCF"),
-        ("a.xml", MJCF.replace('pos="0.5 0.3 0.03"', 'pos="0 -0.3 0.4" size="1 1 1"'), "give a file of MJCF"),
-        (
-            "a.xml",
-            MJCF.replace("</mujoco>", '<actuator><motor joint="hinge"/></actuator></mujoco>'),
-            "a.xml: a scene has no actuators",
-        ),
-        ("b.xml", MJCF.replace("box", "file"), "b.xml: .*; give a file of MJCF"),
-        ("a.json", "{}", "a.json: give a cell file"),
-        ("a.toml", "format = 2", "a.toml: format: 2; give 1"),
+        ("a.xml", "<mujoco><worldbody><geom/></worldbody></mujoco>", ModelError, "a.xml: .*; give a file of MJCF"),
+        ("a.xml", MJCF.replace("</mujoco>", '<actuator><motor joint="hinge"/></actuator></mujoco>'), ModelError,
+         "a.xml: a scene has no actuators"),
+        ("b.xml", MJCF.replace("box", "file"), ModelError, "b.xml: .*; give a file of MJCF"),
+        ("a.json", "{}", ModelError, "a.json: give a cell file"),
+        ("a.toml", "format = 2", ModelError, "a.toml: format: 2; give 1"),
+        ("full.xml", '<mujoco><worldbody><geom type="box" size="1 1 1"/></worldbody></mujoco>', RefusedError, IN_THE_WAY),
+        ("high.toml", 'format = 1\nname = "high"\n[floor]\nz = 0.5', RefusedError, IN_THE_WAY),
+        ("wall.toml", 'format = 1\nname = "wall"\n[[walls]]\nname = "near"\nx_max = 0.1', RefusedError, IN_THE_WAY),
     ],
-)
-def test_a_scene_that_makes_no_sense_is_one_line(tmp_path, name, text, said):
+)  # fmt: skip
+def test_a_scene_that_makes_no_sense_or_stands_where_the_arm_is_is_one_line(
+    tmp_path, name, text, error, said
+):
     path = tmp_path / name
     path.write_text(text)
-    with pytest.raises(ModelError, match=said):
-        furnished(load_scene(path))
-
-
-@pytest.mark.parametrize(
-    ("name", "text"),
-    [
-        ("full.xml", '<mujoco><worldbody><geom type="box" size="1 1 1"/></worldbody></mujoco>'),
-        ("high.toml", 'format = 1\nname = "high"\n[floor]\nz = 0.5'),
-        ("wall.toml", 'format = 1\nname = "wall"\n[[walls]]\nname = "near"\nx_max = 0.1'),
-    ],
-)
-def test_nothing_stands_where_the_arm_is(tmp_path, name, text):
-    path = tmp_path / name
-    path.write_text(text)
-    with pytest.raises(RefusedError, match="the arm is where something should stand"):
+    with pytest.raises(error, match=said):
         furnished(load_scene(path))

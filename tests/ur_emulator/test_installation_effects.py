@@ -2,7 +2,9 @@
 
 import gzip
 import math
+import re
 from contextlib import contextmanager
+from pathlib import Path
 
 import pytest
 from box_support import Bench, MessageReader, connect, inside
@@ -26,12 +28,7 @@ from ur_emulator.machine.models.robot_model import ZERO6
 from ur_emulator.machine.models.robots import robot_by_name
 from ur_emulator.machine.models.safety_limits import ArmLimits
 from ur_emulator.program_files.header import header_lines, setup_script
-from ur_emulator.program_files.installation import (
-    DeclaredSignal,
-    Feature,
-    Installation,
-    OutputRule,
-)
+from ur_emulator.program_files.installation import DeclaredSignal, Feature, Installation, OutputRule
 from urscript import compile_program
 
 LAMP = DeclaredSignal("LAMP", "10.0.0.9", 255, 7, SignalType.DIGITAL_OUTPUT, 5.0, RunState.LOW_WHEN_STOPPED)
@@ -70,43 +67,13 @@ def dashboard(box):
 
 
 def test_the_header_has_what_polyscope_writes():
-    lines = list(header_lines(CELL))
-    counter = next(line for line in lines if line.startswith("step_count_")).removesuffix(" = 0.0")
-    thread = "Step_Counter_Thread_" + counter.removeprefix("step_count_")
-    assert lines == [
-        "set_standard_analog_input_domain(0, 1)",
-        "set_standard_analog_input_domain(1, 1)",
-        "set_tool_analog_input_domain(0, 1)",
-        "set_tool_analog_input_domain(1, 1)",
-        "set_analog_outputdomain(0, 0)",
-        "set_analog_outputdomain(1, 0)",
-        "set_tool_voltage(24)",
-        "set_input_actions_to_default()",
-        'set_tool_digital_input_action(1, "freedrive")',
-        "set_runstate_standard_digital_outputs([1])",
-        "set_runstate_standard_digital_output_to_value(1, 1)",
-        "set_runstate_standard_digital_output_to_value(2, 3)",
-        "set_safety_mode_transition_hardness(1)",
-        "set_tcp(p[0.0, 0.0, 0.12, 0.0, 0.0, 0.5])",
-        "set_payload(1.25, [0.0, 0.01, 0.05])",
-        "set_gravity([0.0, 0.0, 9.82])",
-        f"{counter} = 0.0",
-        f"thread {thread}():",
-        "  while (True):",
-        f"    {counter} = {counter} + 1.0",
-        "    sync()",
-        "  end",
-        "end",
-        f"run {thread}()",
-        'modbus_add_signal("10.0.0.9", 255, 7, 1, "LAMP", False)',
-        'modbus_set_signal_update_frequency("LAMP", 5)',
-        'modbus_set_runstate_dependent_choice("LAMP",1)',
-        "global count=7",
-        'global names=["a", "b"]',
-        "global Box=p[0.0, 0.0, 0.0, 0.0, 0.0, 0.0]",
-        "global table=p[0.1, 0.2, 0.3, 0.0, 0.0, 0.0]",
-    ]
-    compile_program("def p():\n" + "\n".join(lines) + "\nend\n")
+    text = "\n".join(header_lines(CELL))
+    golden = (Path(__file__).parents[1] / "programs" / "installation_header.script").read_text()
+    assert (
+        re.sub(r"(?<=step_count)_\w+|(?<=Step_Counter_Thread)_\w+", "", text)
+        == golden.partition("\n")[2].rstrip()
+    )
+    compile_program(f"def p():\n{text}\nend\n")
 
 
 def test_an_installation_takes_back_what_the_one_before_has_set_up():
@@ -118,36 +85,25 @@ def test_an_installation_takes_back_what_the_one_before_has_set_up():
 
 @pytest.mark.parametrize("power", ["on", "off"])
 def test_an_installation_is_effective_when_it_is_loaded(box, dashboard, tmp_path, power):
-    (tmp_path / "cell.installation").write_bytes(
-        installation(TCP, "<IOs>", listed("DigitalOutputActions", "NONE", "PROGRAM_RUNNING"), "</IOs>")
-    )
+    actions = listed("DigitalOutputActions", "NONE", "PROGRAM_RUNNING")
+    (tmp_path / "cell.installation").write_bytes(installation(TCP, "<IOs>", actions, "</IOs>"))
     if power == "off":
         dashboard.ask("power off")
-    assert (
-        dashboard.ask("load installation cell.installation")
-        == "Loading installation: /programs/cell.installation"
-    )
+    said = dashboard.ask("load installation cell.installation")
+    assert said == "Loading installation: /programs/cell.installation"
     state = inside(box)._box.controller.snapshot
-    assert (state.tcp_offset, state.payload, state.payload_cog) == (
-        (0.0, 0.0, 0.12, 0.0, 0.0, 0.5),
-        1.25,
-        (0.0, 0.01, 0.05),
-    )
+    assert state.tcp_offset == (0.0, 0.0, 0.12, 0.0, 0.0, 0.5)
+    assert (state.payload, state.payload_cog) == (1.25, (0.0, 0.01, 0.05))
 
 
 def test_a_program_takes_the_installation_that_it_names(box, dashboard, tmp_path):
-    (tmp_path / "cell.installation").write_bytes(
-        installation(
-            TCP, "<Features>", pose_feature("table", (0.5, 0, 0, 0, 0, 0), is_variable=True), "</Features>"
-        )
-    )
+    table = pose_feature("table", (0.5, 0, 0, 0, 0, 0), is_variable=True)
+    (tmp_path / "cell.installation").write_bytes(installation(TCP, "<Features>", table, "</Features>"))
     (tmp_path / "p.urp").write_bytes(urp(script_line("textmsg(table)"), installation="cell"))
     with connect(box, "primary") as sock:
         reader = MessageReader(sock)
-        assert dashboard.ask_all("load p.urp", "play") == [
-            "Loading program: /programs/p.urp",
-            "Starting program",
-        ]
+        said = dashboard.ask_all("load p.urp", "play")
+        assert said == ["Loading program: /programs/p.urp", "Starting program"]
         assert reader.message(TextMessage).text == "p[0.5,0,0,0,0,0]"
 
 
@@ -162,9 +118,8 @@ def test_the_limits_of_an_installation_bind_the_arm(box, dashboard, tmp_path):
     """The ranges of the joints count from its safety settings, and the speeds of reduced mode."""
     narrow = SAFETY.replace("[1, 1, 1,", "[0, 1, 1,")
     (tmp_path / "cell.installation").write_bytes(installation(f"<SafetySettings>{narrow}</SafetySettings>"))
-    nodes = script_line("textmsg(is_within_safety_limits([0, -1, 0, 0, 0, 0]))") + script_line(
-        "movej([1.0, -1.76, -2.1, -0.1, 1.3, 1.86])"
-    )
+    nodes = script_line("textmsg(is_within_safety_limits([0, -1, 0, 0, 0, 0]))")
+    nodes += script_line("movej([1.0, -1.76, -2.1, -0.1, 1.3, 1.86])")
     (tmp_path / "p.urp").write_bytes(urp(nodes, installation="cell"))
     with connect(box, "primary") as sock:
         reader = MessageReader(sock)
@@ -178,35 +133,21 @@ def test_the_limits_of_an_installation_bind_the_arm(box, dashboard, tmp_path):
     assert inside(box)._box.controller.state.safety.limits == limits_of(robot_by_name("ur3"))
 
 
-INPUTS = """
-[SafetyIOConfiguration Inputs]
-safeguardStopResetInputA = 0
-safeguardStopResetInputB = 1
-threePositionEnablingInputA = 2
-threePositionEnablingInputB = 3
-operationalModeInputA = 255
-operationalModeInputB = 255
-automaticModeSafeguardStopInputA = 4
-automaticModeSafeguardStopInputB = 5
-automaticModeSafeguardStopResetInputA = 6
-automaticModeSafeguardStopResetInputB = 7
-"""
-
-
-@pytest.mark.parametrize(
-    ("robot", "assigned"),
-    [
-        ("ur3", {}),
-        (
-            "ur5e",
-            {
-                1: SafetyInput.ENABLING_DEVICE,
-                2: SafetyInput.AUTOMATIC_SAFEGUARD,
-                3: SafetyInput.AUTOMATIC_RESET,
-            },
-        ),
-    ],
+PAIRS = {
+    "safeguardStopReset": (0, 1), "threePositionEnabling": (2, 3), "operationalMode": (255, 255),
+    "automaticModeSafeguardStop": (4, 5), "automaticModeSafeguardStopReset": (6, 7),
+}  # fmt: skip
+INPUTS = "\n[SafetyIOConfiguration Inputs]\n" + "".join(
+    f"{name}InputA = {a}\n{name}InputB = {b}\n" for name, (a, b) in PAIRS.items()
 )
+ASSIGNED = {
+    1: SafetyInput.ENABLING_DEVICE,
+    2: SafetyInput.AUTOMATIC_SAFEGUARD,
+    3: SafetyInput.AUTOMATIC_RESET,
+}
+
+
+@pytest.mark.parametrize(("robot", "assigned"), [("ur3", {}), ("ur5e", ASSIGNED)])
 def test_an_installation_sets_up_inputs_of_an_e_series_box(tmp_path, robot, assigned):
     settings = f"<SafetySettings>{SAFETY}{INPUTS}</SafetySettings>"
     (tmp_path / "cell.installation").write_bytes(installation(settings))
@@ -268,9 +209,8 @@ def test_inverse_kinematics_and_what_clients_are_told_keep_the_limits_of_an_inst
     texts = " ".join(entry.text for entry in box.log)
     unknown = "SafetyLimits BoundaryPlane0 with the unknown mode FAR is not watched"
     assert f"/programs/cell.installation: {unknown}" in texts
-    assert [plane.name for plane in inside(box)._box.controller.state.safety.limits.boundaries.planes] == [
-        "BoundaryPlane1"
-    ]
+    limits = inside(box)._box.controller.state.safety.limits
+    assert [plane.name for plane in limits.boundaries.planes] == ["BoundaryPlane1"]
     with connect(box, "primary") as sock:
         first = MessageReader(sock).state()
     assert first.find(ConfigurationData).joint_max_limit[0] == pytest.approx(0.0524, abs=1e-4)
@@ -286,10 +226,9 @@ def set_up(bench, **settings):
 def test_an_installation_does_not_act_in_the_middle_of_a_motion():
     bench = Bench(fidelity="ideal")
     bench.tick(1, StartProgram(compile_program("movej([-1.0, -1.7, -1.7, -0.1, 1.2, 1.8])\n")))
+    set_up = SetUp(compile_program("sec s():\n  sync()\nend\n"), bench.controller.state.safety.limits, {})
     with pytest.raises(RefusedError, match="a program runs"):
-        SetUp(compile_program("sec s():\n  sync()\nend\n"), bench.controller.state.safety.limits, {}).apply(
-            bench.controller
-        )
+        set_up.apply(bench.controller)
 
 
 def test_what_is_loaded_stays_when_a_program_begins_while_another_is_read(tmp_path):
@@ -475,10 +414,8 @@ def test_what_a_client_loads_at_start_up_stays(tmp_path):
         loaded = [entry.text for entry in box.log if entry.text.startswith("Loaded program")]
         assert loaded == ["Loaded program: /programs/sub/p.urp", "Loaded program: /programs/other.urp"]
         pulse(box, dashboard, 6)
-        assert dashboard.ask_all("running", "get loaded program") == [
-            "Program running: false",
-            "Loaded program: /programs/other.urp",
-        ]
+        said = dashboard.ask_all("running", "get loaded program")
+        assert said == ["Program running: false", "Loaded program: /programs/other.urp"]
 
 
 def test_a_start_line_that_is_no_input_is_said(tmp_path):

@@ -23,12 +23,7 @@ from ur_emulator.machine.controller.io.network import SignalType
 from ur_emulator.machine.controller.safety.boundaries import NO_BOUNDARIES, BoundaryMode, ToolDirection
 from ur_emulator.machine.models.safety_limits import ArmLimits
 from ur_emulator.program_files.folder import ProgramFolder
-from ur_emulator.program_files.installation import (
-    DeclaredSignal,
-    Feature,
-    OutputRule,
-    StartUp,
-)
+from ur_emulator.program_files.installation import DeclaredSignal, Feature, OutputRule, StartUp
 from ur_emulator.program_files.installation_reader import NEW_BOX, load_installation
 
 
@@ -53,20 +48,16 @@ def test_tcps_and_payload(tmp_path):
     assert (cell.payload, cell.payload_cog) == (1.25, (0.0, 0.01, 0.05))
     new = read(tmp_path, TCP, NEW_PAYLOAD)
     assert (new.payload, new.payload_cog) == (0.75, (0.0, 0.0, 0.04))
-    old = TCP.replace("TCPSettings", "com.ur.view.tcp.domain.TCPSettingsImpl").replace(
-        ' centerOfGravity="0.0, 0.01, 0.05"', ""
-    )
-    assert read(tmp_path, old).tcp_offset == cell.tcp_offset
-    assert (read(tmp_path, old).payload, read(tmp_path, old).payload_cog) == (1.25, None)
+    text = TCP.replace("TCPSettings", "com.ur.view.tcp.domain.TCPSettingsImpl")
+    old = read(tmp_path, text.replace(' centerOfGravity="0.0, 0.01, 0.05"', ""))
+    assert (old.tcp_offset, old.payload, old.payload_cog) == (cell.tcp_offset, 1.25, None)
 
 
 def test_mounting(tmp_path):
     assert read(tmp_path, f"<Features>{MOUNTING}</Features>").gravity == pytest.approx((0.0, 0.0, -9.82))
     tilted = MOUNTING.replace(f'tiltAngle="{pi}"', f'tiltAngle="{pi / 2}"')
-    share = 9.82 / 2**0.5
-    assert read(tmp_path, f"<Features>{tilted}</Features>").gravity == pytest.approx(
-        (share, -share, 0.0), abs=1e-12
-    )
+    share, cell = 9.82 / 2**0.5, read(tmp_path, f"<Features>{tilted}</Features>")
+    assert cell.gravity == pytest.approx((share, -share, 0.0), abs=1e-12)
 
 
 def test_names_of_lines(tmp_path):
@@ -100,11 +91,7 @@ def test_actions_domains_and_tool(tmp_path):
     )
 
 
-@pytest.mark.parametrize(
-    "container",
-    ["Features", "GeomFeatures"],
-    ids=["as in most files", "as in 3.5, 3.12, 5.1, 5.7"],
-)
+@pytest.mark.parametrize("container", ["Features", "GeomFeatures"])  # the latter in 3.5, 3.12, 5.1, 5.7
 def test_features(tmp_path, container):
     table, corner = (0.3, -0.2, 0.1, 0.0, 0.0, 1.5), (0.1, 0.2, 0.3, 0.0, 0.0, 0.0)
     # P1 to P2 is along the base's x, P3 in its x-y plane: y of the plane is x, z is up, x is y cross z.

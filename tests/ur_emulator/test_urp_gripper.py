@@ -2,10 +2,10 @@
 
 import pytest
 from dashboard_support import gripper_move, gripper_node, script_line, urp
+from finger_support import tool_box
 from installation_support import installation
 from urp_support import NEW_BOX, lines_of, script_of, undefined_in
 
-from ur_emulator import ControlBox
 from ur_emulator.errors import ProgramFileError, UnknownNodeError
 from ur_emulator.program_files.folder import ProgramFolder
 from ur_emulator.program_files.installation import GripperCalibration, GripperSetup, Installation
@@ -17,33 +17,6 @@ CALIBRATION = GripperCalibration(90.2, 1.18, 0.0, 85.0)
 CALIBRATED = Installation("/programs/cell.installation", grippers=GripperSetup(True, True, {1: CALIBRATION}))
 
 
-def check(*, detects=True, **data):
-    branches = gripper_node("If", script_line('textmsg("held")')) + gripper_node(
-        "Else", script_line('textmsg("nothing")')
-    )
-    return gripper_node("Grip Check", branches, ObjectDetectedKey=str(detects).lower(), **data)
-
-
-def test_a_motion_is_guarded_and_waits(tmp_path):
-    assert lines_of(tmp_path, gripper_move(50, speed=10, force=1)) == [
-        "# begin: URCap Program Node",
-        "#   Source: Robotiq_Grippers, Robotiq Inc.",
-        "#   Type: Gripper",
-        '$ 2 "Gripper Move50% (1)"',
-        "if not(gripper_connected[0]):",
-        'popup("Gripper 1 does not answer.", "No connection", False, True, True)',
-        "end",
-        'if not(rq_is_gripper_activated("1")):',
-        'popup("Gripper 1 must be activated first.", "Not activated", False, True, True)',
-        "end",
-        'rq_set_pos_spd_for(128, 26, 3, "1")',
-        'rq_wait_pos_spe_for_request(128, 26, 3, "1")',
-        'rq_go_to("1")',
-        'rq_wait("1")',
-        "# end: URCap Program Node",
-    ]
-
-
 @pytest.mark.parametrize(
     ("node", "installed", "label"),
     [
@@ -52,62 +25,10 @@ def test_a_motion_is_guarded_and_waits(tmp_path):
         (gripper_move(40, slaveIds="[2]"), CALIBRATED, "Gripper Move40% (2)"),
         (gripper_move(60, slaveIds="[9]"), CALIBRATED, "Gripper Move29mm (1)"),
         (gripper_move(99), CALIBRATED, "Gripper Move0mm (1)"),
-        (gripper_node("Gripper Activate"), NEW_BOX, "Gripper Activate"),
-        (gripper_node("Gripper Activate", ResetAndActivateKey="true"), NEW_BOX, "Gripper Reset and Activate"),
     ],
 )
 def test_labels(tmp_path, node, installed, label):
     assert lines_of(tmp_path, node, installed)[3] == f'$ 2 "{label}"'
-
-
-def test_a_motion_that_does_not_block_is_not_waited_for(tmp_path):
-    lines = lines_of(tmp_path, gripper_move(0, blocking="false", slaveIds="[3]"))
-    assert lines[-2:] == ['rq_go_to("3")', "# end: URCap Program Node"]
-
-
-def test_several_grippers_have_their_targets_before_the_first_one_moves(tmp_path):
-    lines = lines_of(tmp_path, gripper_move(100, slaveIds="[9, 2]"))
-    assert lines[3] == '$ 2 "Gripper Close (1, 2)"'
-    calls = [line for line in lines if line.startswith("rq_")]
-    assert [(call.partition("(")[0], call[-3:-1]) for call in calls] == [
-        ("rq_set_pos_spd_for", '1"'),
-        ("rq_wait_pos_spe_for_request", '1"'),
-        ("rq_set_pos_spd_for", '2"'),
-        ("rq_wait_pos_spe_for_request", '2"'),
-        ("rq_go_to", '1"'),
-        ("rq_go_to", '2"'),
-        ("rq_wait", '1"'),
-        ("rq_wait", '2"'),
-    ]
-    assert lines.count("if not(gripper_connected[1]):") == 1
-
-
-@pytest.mark.parametrize(
-    ("node", "label", "condition"),
-    [
-        (check(), "If object detected", 'rq_is_object_detected("1")'),
-        (check(detects=False), "If object not detected", 'not rq_is_object_detected("1")'),
-        (
-            check(GripperIdKey="2", DimensionValidationKey="true", DimensionKey="50", DimensionNegativeGapKey="10",
-                  DimensionDimensionPositiveGapKey="5"),
-            "If grip validated",
-            'rq_is_object_detected("2") and rq_current_pos("2") >= 102.00 and rq_current_pos("2") <= 140.25',
-        ),
-    ],
-)  # fmt: skip
-def test_a_check_of_the_grip_has_two_branches(tmp_path, node, label, condition):
-    assert lines_of(tmp_path, node)[3:-1] == [
-        '$ 2 "Grip Check"',
-        f'$ 3 "{label}          " "noBreak"',
-        f"if ({condition}):",
-        "$ 4 \"textmsg('held')\"",
-        'textmsg("held")',
-        "else:",
-        '$ 5 "Else" "noBreak"',
-        "$ 6 \"textmsg('nothing')\"",
-        'textmsg("nothing")',
-        "end",
-    ]
 
 
 @pytest.mark.parametrize(
@@ -115,7 +36,6 @@ def test_a_check_of_the_grip_has_two_branches(tmp_path, node, label, condition):
     [
         (gripper_node("Vacuum"), "a node 'Vacuum' of the URCap 'Robotiq_Grippers' cannot"),
         (gripper_move(0, slaveIds="[9, 5]"), "a node of the grippers '9, 5' cannot"),
-        (gripper_move(0, slaveIds="[9, 1]"), "a node of the grippers '9, 1' cannot"),
     ],
 )
 def test_nodes_that_are_not_known(tmp_path, node, problem):
@@ -153,22 +73,24 @@ def contribution(**values):
     return f'<Contributed ownerId="com.robotiq.urcap.gripper" title="Gripper"><dataModel>{data}</dataModel></Contributed>'
 
 
+VALUES = {
+    "gripper_current_limit_enabled": "true",
+    "_models.Gripper1._isCalibrationDefined": "true",
+    "_models.Gripper1._openValueInMillimeters": "85.0",
+    "_models.Gripper1._closedValueInMillimeters": "0.0",
+    "_models.Gripper1._openValueInPercent": "1.18",
+    "_models.Gripper1._closedValueInPercent": "90.2",
+    "_models.Gripper2._isCalibrationDefined": "false",
+}
+
+
 def test_the_installation_gives_calibrations_and_the_voltage(tmp_path):
-    values = {
-        "gripper_current_limit_enabled": "true",
-        "_models.Gripper1._isCalibrationDefined": "true",
-        "_models.Gripper1._openValueInMillimeters": "85.0",
-        "_models.Gripper1._closedValueInMillimeters": "0.0",
-        "_models.Gripper1._openValueInPercent": "1.18",
-        "_models.Gripper1._closedValueInPercent": "90.2",
-        "_models.Gripper2._isCalibrationDefined": "false",
-    }
     path = tmp_path / "cell.installation"
-    path.write_bytes(installation(contribution(**values)))
+    path.write_bytes(installation(contribution(**VALUES)))
     cell = load_installation(ProgramFolder(tmp_path), path.name)
     assert (cell.grippers, cell.tool_voltage) == (CALIBRATED.grippers, 24)
     for key, value in (("_openValueInPercent", "90.2"), ("_openValueInMillimeters", "1e308")):
-        path.write_bytes(installation(contribution(**values | {f"_models.Gripper1.{key}": value})))
+        path.write_bytes(installation(contribution(**VALUES | {f"_models.Gripper1.{key}": value})))
         with pytest.raises(ProgramFileError, match="use two positions, widths below 1 m"):
             load_installation(ProgramFolder(tmp_path), path.name)
 
@@ -176,12 +98,16 @@ def test_the_installation_gives_calibrations_and_the_voltage(tmp_path):
 # --- what the script does
 
 
+BRANCHES = "".join(
+    gripper_node(name, script_line(f'textmsg("{text}")'))
+    for name, text in (("If", "held"), ("Else", "nothing"))
+)
 GRIP = (
     gripper_node("Gripper Activate", ResetAndActivateKey="true")
     + gripper_move(0)
     + script_line('textmsg("open ", rq_current_pos_norm())')
     + gripper_move(100)
-    + check()
+    + gripper_node("Grip Check", BRANCHES, ObjectDetectedKey="true")
     + script_line('textmsg("wide ", rq_current_pos_mm())')
     + gripper_move(0)
 )
@@ -189,24 +115,15 @@ REACH = """
 def reach():
   set_tcp(p[0, 0, 0.15, 0, 0, 0])
   set_payload(0.9, [0, 0, 0.058])
-  movej(get_inverse_kin(p[0.5, 0.2, 0.1, 3.14159, 0, 0]), a=1.2, v=1.0)
-  movel(p[0.5, 0.2, 0, 3.14159, 0, 0], a=0.5, v=0.15)
+  movej(get_inverse_kin(p[0.5, 0.2, 0.1, 3.14159, 0, 0]), a=3, v=2)
+  movel(p[0.5, 0.2, 0, 3.14159, 0, 0], a=1.2, v=0.4)
 end
 """
 
 
 @pytest.fixture
 def programs(tmp_path):
-    values = {
-        "_models.Gripper1._isCalibrationDefined": "true",
-        "_models.Gripper1._openValueInMillimeters": "85",
-    }
-    values |= {
-        "_models.Gripper1._closedValueInMillimeters": "0",
-        "_models.Gripper1._openValueInPercent": "1.18",
-    }
-    values |= {"_models.Gripper1._closedValueInPercent": "90.2"}
-    (tmp_path / "cell.installation").write_bytes(installation(contribution(**values)))
+    (tmp_path / "cell.installation").write_bytes(installation(contribution(**VALUES)))
     (tmp_path / "grip.urp").write_bytes(urp(GRIP, name="grip", installation="cell"))
     (tmp_path / "move.urp").write_bytes(urp(gripper_move(0), name="move", installation="cell"))
     return tmp_path
@@ -222,21 +139,10 @@ def said(box, run):
 
 
 def test_a_program_sees_what_it_has_gripped(programs):
-    with ControlBox(
-        "ur5e",
-        in_process=True,
-        pace="lockstep",
-        port_base=None,
-        seed=7,
-        tool="robotiq-2f85",
-        programs=programs,
-    ) as box:
+    with tool_box("robotiq-2f85", programs=programs) as box:
         box.run_program(file="move.urp", wait=False)
         assert box.wait_until(popup=True).popups == ("Gripper 1 must be activated first.",)
         box.close_popups()
-        lines = said(box, lambda: box.run_program(file="grip.urp", wait=True))
-        assert lines[:2] == ["open 1", "nothing"]
-        assert float(lines[2].removeprefix("wide ")) == pytest.approx(0.0, abs=0.3)
         box.add_thing("block", "box", (0.04, 0.04, 0.04), 0.1, (0.5, 0.2, 0.0, 0, 0, 0))
         box.run_program(REACH, wait=True)
         lines = said(box, lambda: box.run_program(file="grip.urp", wait=True))
@@ -245,6 +151,6 @@ def test_a_program_sees_what_it_has_gripped(programs):
 
 
 def test_without_a_gripper_a_program_shows_that_there_is_no_connection(programs):
-    with ControlBox("ur5e", in_process=True, pace="lockstep", port_base=None, programs=programs) as box:
+    with tool_box("none", programs=programs) as box:
         box.run_program(file="grip.urp", wait=False)
         assert box.wait_until(popup=True).popups == ("Gripper 1 does not answer.",)
