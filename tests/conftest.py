@@ -6,11 +6,14 @@ rests while tests are collected, and never looks again at what exists then.
 
 import gc
 import os
+import signal
 
 import pytest
 from hypothesis import HealthCheck, settings
 
 gc.disable()
+# Shells start what runs in the background with Ctrl-C ignored, and so would be what the tests start.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 _COMMON = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.register_profile("fixed", _COMMON, derandomize=True, max_examples=25)
 settings.register_profile("nightly", _COMMON, print_blob=True, max_examples=500)
