@@ -23,7 +23,6 @@ from ur_emulator.errors import (
 from ur_emulator.host.runtime import processes
 from ur_emulator.machine.commands.programs import ClosePopup
 
-LOOP = "def loop():\n  while True:\n    sync()\n  end\nend\n"
 TOKEN = "secret"
 
 
