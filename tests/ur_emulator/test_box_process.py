@@ -23,7 +23,6 @@ from ur_emulator.errors import (
 from ur_emulator.host.runtime import processes
 from ur_emulator.machine.commands.programs import ClosePopup
 
-LOOP = "def loop():\n  while True:\n    sync()\n  end\nend\n"
 TOKEN = "secret"
 
 
@@ -72,12 +71,15 @@ def test_the_folder_of_a_box_that_was_killed_is_removed(tmp_path, monkeypatch):
     processes._server.end()
 
 
-def test_a_box_that_was_never_started_or_is_forgotten_leaves_no_process():
+def test_a_box_that_has_ended_was_never_started_or_is_forgotten_leaves_no_process():
     started = ControlBox(pace="lockstep", port_base=None)
     started.__enter__()
     made = ControlBox(pace="lockstep", port_base=None)
     left = [process_of(started), process_of(made)]
-    del started, made
+    with ControlBox(pace="lockstep", port_base=None) as ended:
+        left.append(process_of(ended))
+    del started
+    made.close()
     gc.collect()
     assert not psutil.wait_procs(left, timeout=TIMEOUT)[1]
 

@@ -351,14 +351,16 @@ def test_popups_are_seen_and_closed_and_what_cannot_be_said_is_refused(box):
 # --- threads and life
 
 
-def test_who_submits_a_command_gets_its_result(box):
+def test_who_submits_a_command_gets_its_result_from_another_process():
     told = queue.SimpleQueue()
-    for command in (Push((1, 0, 0), duration=0.1), RemoveObstacle("wall")):
-        box.submit(command, lambda result, refusal: told.put((result, refusal and str(refusal))))
-    assert told.get(timeout=TIMEOUT) == (None, None)
-    assert told.get(timeout=TIMEOUT) == (None, "there is no obstacle 'wall': there is none")
-    box.submit(RemoveObstacle("wall"))  # nobody wants to know
-    assert box.state.robot_mode == "RUNNING"
+    with control_box(control_port=None) as box:
+        for command in (Push((1, 0, 0), duration=0.1), RemoveObstacle("wall")):
+            box.submit(command, lambda result, refusal: told.put((result, refusal and str(refusal))))
+        assert told.get(timeout=TIMEOUT) == (None, None)
+        assert told.get(timeout=TIMEOUT) == (None, "there is no obstacle 'wall': there is none")
+        box.submit(RemoveObstacle("wall"))  # nobody wants to know
+        with pytest.raises(RefusedError, match="no obstacle 'wall'"):
+            box.remove_obstacle("wall")
 
 
 def test_a_box_that_does_not_run_says_so():

@@ -105,6 +105,7 @@ def test_a_wait_is_answered_when_it_is_over_and_others_are_served_meanwhile(box,
         ("POST", "/v1/push", {}, 400, "needs force"),
         ("POST", "/v1/push", b'{"force": [0, 0, NaN]}', 400, "NaN is not a number"),
         ("POST", "/v1/push", b'{"force": [0, 0, 1e999]}', 400, "three numbers"),
+        ("POST", "/v1/push", b'{"force": [0, 0, 1' + b"0" * 4000 + b"]}", 400, "three numbers"),
         ("POST", "/v1/push", b'{"force": [0, 0, 1' + b"0" * 5000 + b"]}", 400, "not JSON"),
         ("POST", "/v1/push", b"force=1", 400, "not JSON"),
         ("POST", "/v1/push", b"[1, 2]", 400, "JSON object"),
@@ -298,6 +299,11 @@ def test_who_goes_while_it_waits_is_forgotten(box):
             if not inside(box)._box.steps._under_way:
                 return
     raise AssertionError("they are waited for still")
+
+
+def test_a_client_that_reads_nothing_is_cut_off(http):
+    with pytest.raises(ConnectionError):
+        http.send(http.request("GET", "/v1/operations") * 200_000)
 
 
 def test_a_client_asks_before_it_sends_its_body(http):

@@ -146,10 +146,17 @@ def test_the_command_line_names_defaults_and_the_software_is_for_the_arms_that_r
     result.assert_outcomes(passed=3)
 
 
-def test_defaults_that_cannot_be_are_one_line(suite):
-    result = suite("def test_never(ur_box): pass\n" * 3, "--ur-robot=ur5e", "--ur-version=3.5.0")
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (["--ur-robot=ur5e", "--ur-version=3.5.0"], "*version 3.5.0 given: software of the e-Series is 5.x*"),
+        (["--ur-robot=ur9"], "*unknown robot 'ur9'*"),
+    ],
+)
+def test_defaults_that_cannot_be_are_one_line(suite, words, text):
+    result = suite("def test_never(ur_box): pass\n" * 3, *words)
     assert result.ret == pytest.ExitCode.USAGE_ERROR
-    result.stderr.fnmatch_lines(["*version 3.5.0 given: software of the e-Series is 5.x*"])
+    result.stderr.fnmatch_lines([text])
     assert len(result.errlines) <= 2
 
 

@@ -455,6 +455,13 @@ def test_others_are_answered_while_one_waits(folder, box):
             ]  # fmt: skip
 
 
+def test_a_client_that_reads_nothing_is_cut_off(box):
+    """Its replies cannot be dropped one by one, the rest would answer the wrong lines."""
+    with connect(box, "dashboard") as greedy, pytest.raises(ConnectionError):
+        greedy.sendall((b"load " + b"z" * 60_000 + b"\n") * 1_000)
+    still_serves(box)
+
+
 ARGUMENTS = [
     "wait.urp", "hello.urp", "strange.urp", "cell/count me.script", "default.installation", "x", "OPERATOR", ".", "system",
 ]  # fmt: skip

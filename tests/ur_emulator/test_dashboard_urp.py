@@ -41,6 +41,7 @@ from ur_emulator.program_files.loading import load_program
         ('<Popup inputType="Dance"/>', "a popup of 'Dance' cannot"),
         ('<Assignment valueSource="Operator" valueType="Pose"><variable name="a"/></Assignment>', "from 'Operator Pose' cannot"),
         (f'<Assignment><variable reference="../../Nothing[3]"/>{expression("1")}</Assignment>', "'../../Nothing\\[3\\]' of <variable> leads nowhere"),
+        (f'<Assignment><variable reference="/etc/passwd"/>{expression("1")}</Assignment>', "leads nowhere"),
         (f'<Assignment><variable reference="../variable"/>{expression("1")}</Assignment>', "lead in a circle"),
         ('<Script type="Poem"/>', "a <Script> of type 'Poem' cannot"),
         ('<Switch><expression><ExpressionChar character="1"/></expression><children><Halt/></children></Switch>', "<Halt> in a <Switch>"),

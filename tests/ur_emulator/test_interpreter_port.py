@@ -300,3 +300,8 @@ def test_log_files_are_those_of_the_manual():
     queue.is_ending = True
     queue.leave()
     assert queue.log.files == {"interpreter.saved.log": "interpreter log\ne: 0 c: 1 : x = 1\n"}
+
+
+def test_what_is_nested_too_deeply_is_discarded():
+    found = compile_line("x = " + "-" * 5_000 + "1", 1, SCOPE, NO_NAMES, CATALOGUE)
+    assert found == "Syntax error: the statements are nested too deeply"

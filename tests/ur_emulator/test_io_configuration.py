@@ -27,9 +27,6 @@ def test_all_actions_to_default(bench):
     assert actions == {}
 
 
-BENCH = Bench()
-
-
 def signed(word):
     return word - 0x10000 if word & 0x8000 else word
 

@@ -146,16 +146,18 @@ def answered(monkeypatch):
 
 
 def test_a_client_that_sends_a_thousand_lines_does_not_keep_another_waiting(box, answered):
-    with connect(box, "dashboard") as greedy, connect(box, "dashboard") as polite:
-        for sock in (greedy, polite):
+    with ExitStack() as stack:
+        greedy, polite, other = (stack.enter_context(connect(box, "dashboard")) for _ in range(3))
+        for sock in (greedy, polite, other):
             read_lines(sock, 1)
         with standing_still(box):
-            greedy.sendall(b"robotmode\n" * 1000)
+            for sock in (greedy, other):
+                sock.sendall(b"robotmode\n" * 1000)
             polite.sendall(b"PolyscopeVersion\n")
-        assert len(read_lines(greedy, 1000)) == 1000
-        assert len(read_lines(polite, 1)) == 1
-    assert Counter(answered) == {"robotmode": 1000, "PolyscopeVersion": 1}
-    assert answered.index("PolyscopeVersion") <= BUDGETS.client_work
+        for sock, n in ((greedy, 1000), (other, 1000), (polite, 1)):
+            assert len(read_lines(sock, n)) == n
+    assert Counter(answered) == {"robotmode": 2000, "PolyscopeVersion": 1}
+    assert answered.index("PolyscopeVersion") <= BUDGETS.client_work  # two turns at two units a line
 
 
 def test_lines_of_a_client_that_is_gone_are_not_worked_off(box, answered):
@@ -207,12 +209,16 @@ def test_inputs_beyond_those_that_a_cycle_takes_wait_for_the_next_and_keep_their
 # --- accepting: some at a time, and what happens when descriptors are out
 
 
-class Clients:
-    """A port that only remembers who came and what they sent."""
+class Entrance:
+    """A listening port that only remembers who came and what they sent; its loop turns when the test says so."""
 
-    def __init__(self):
-        self.connections = []
-        self.heard = []
+    def __init__(self, loop, host="127.0.0.1", limits=None):
+        self.connections, self.heard, self.notices, self.counts, self.socks = [], [], [], [], []
+        self.loop, self.spare = loop, SpareDescriptor()
+        self.port = Listener(
+            loop, host, 0, self, set(), self.notices.append, pytest.fail, "dashboard", limits or ClientLimits(), self.spare
+        )  # fmt: skip
+        self.address = host, self.port.number
 
     def opened(self, connection):
         self.connections.append(connection)
@@ -223,204 +229,175 @@ class Clients:
     def closed(self, connection):
         self.connections.remove(connection)
 
-
-class Turns:
-    """Notes how many clients there are before each turn of the loop; stops it after so many turns."""
-
-    def __init__(self, loop, clients, n):
-        self.counts = []
-        self._loop, self._clients, self._n = loop, clients, n
-
     def advance(self, now):
-        self.counts.append(len(self._clients.connections))
-        if len(self.counts) > self._n:
-            self._loop.stop()
+        self.counts.append(len(self.connections))
+        if len(self.counts) > self._n_turns:
+            self.loop.stop()
         return now
+
+    def turn(self, n):
+        """Let the loop take n turns; return how many clients there are before each, and after the last."""
+        self._n_turns, self.counts = n, []
+        self.loop._stopping = False
+        self.loop.add(self)
+        self.loop.run()
+        self.loop.remove(self)
+        return self.counts
+
+    def run_for(self, duration):
+        self.loop._stopping = False
+        self.loop.call_later(duration, self.loop.stop, pytest.fail)
+        self.loop.run()
+
+    def connect(self):
+        self.socks.append(socket.create_connection(self.address, timeout=TIMEOUT))
+        return self.socks[-1]
+
+    @property
+    def is_watched(self):
+        return self.port._sock in self.loop._selector.get_map()
+
+    def close(self):
+        for each in (*self.connections, self.port, *self.socks, self.spare):
+            each.close()
 
 
 @pytest.fixture
-def loop():
-    made = EventLoop()
-    yield made
-    made.close()
+def enter():
+    """Make an entrance, which is closed at the end."""
+    with ExitStack() as stack:
+
+        def make(**options):
+            loop = EventLoop()
+            stack.callback(loop.close)
+            entrance = Entrance(loop, **options)
+            stack.callback(entrance.close)
+            return entrance
+
+        yield make
 
 
-def listen(loop, clients, notices=None, **options):
-    report = print if notices is None else notices.append
-    who = options.get("host", "127.0.0.1"), 0, clients, set()
-    limits, spare = options.get("limits") or ClientLimits(), options.get("spare") or SpareDescriptor()
-    return Listener(loop, *who, report, pytest.fail, "dashboard", limits, spare)
+def test_a_crowd_is_let_in_a_few_at_a_time(enter):
+    entrance, few = enter(), BUDGETS.accepted_at_once
+    n = 2 * few + 2
+    for _ in range(n):
+        entrance.connect()
+    assert entrance.turn(4) == [0, few, 2 * few, n, n]
 
 
-def close_all(port, clients, *socks):
-    for connection in tuple(clients.connections):
-        connection.close()
-    port.close()
-    for sock in socks:
-        sock.close()
-
-
-def test_a_crowd_is_let_in_a_few_at_a_time(loop):
-    clients, n = Clients(), 2 * BUDGETS.accepted_at_once + 2
-    port = listen(loop, clients)
-    socks = [socket.create_connection(("127.0.0.1", port.number), timeout=TIMEOUT) for _ in range(n)]
-    turns = Turns(loop, clients, 4)
-    loop.add(turns)
-    loop.run()
-    assert turns.counts == [0, BUDGETS.accepted_at_once, 2 * BUDGETS.accepted_at_once, n, n]
-    close_all(port, clients, *socks)
-
-
-def test_two_hundred_clients_may_wait_to_be_let_in(loop):
+def test_two_hundred_clients_may_wait_to_be_let_in(enter):
     """Those beyond the backlog would wait for a second and more before they try again."""
-    clients = Clients()
-    limits = SimpleNamespace(take=lambda host, port: "", release=lambda host, port: None)  # nobody is refused
-    port = listen(loop, clients, limits=limits)
-    n = min(200, socket.SOMAXCONN)
-    socks = [socket.socket() for _ in range(n)]
-    for sock in socks:
+    nobody_is_refused = SimpleNamespace(take=lambda host, port: "", release=lambda host, port: None)
+    entrance, n = enter(limits=nobody_is_refused), min(200, socket.SOMAXCONN)
+    entrance.socks = [socket.socket() for _ in range(n)]
+    for sock in entrance.socks:
         sock.setblocking(False)
-        assert sock.connect_ex(("127.0.0.1", port.number)) in (0, errno.EINPROGRESS)
-    turns = Turns(loop, clients, n // BUDGETS.accepted_at_once)
-    loop.add(turns)
-    loop.run()
-    assert turns.counts[-1] == n
-    close_all(port, clients, *socks)
+        assert sock.connect_ex(entrance.address) in (0, errno.EINPROGRESS)
+    assert entrance.turn(n // BUDGETS.accepted_at_once)[-1] == n
 
 
-class NoDescriptors(socket.socket):
-    """A listening socket of a process that has no descriptor for its clients, unless one is given up for them."""
+class Troubled(socket.socket):
+    """A listening socket that cannot accept while it is told why."""
 
-    given_up = None
+    trouble = staticmethod(lambda: None)
 
     def accept(self):
-        if self.given_up is None or not self.given_up():
-            raise OSError(errno.EMFILE, "Too many open files")
+        if (error := self.trouble()) is not None:
+            raise error
         return super().accept()
 
 
-def test_without_descriptors_clients_are_closed_at_once_and_the_log_says_so_once(loop, monkeypatch):
-    monkeypatch.setattr(listener.socket, "socket", NoDescriptors)
-    clients, notices, spare = Clients(), [], SpareDescriptor()
+NO_DESCRIPTORS = OSError(errno.EMFILE, "Too many open files")
+GONE = ConnectionAbortedError(errno.ECONNABORTED, "Software caused connection abort")
+
+
+@pytest.fixture
+def troubled(enter, monkeypatch):
+    """An entrance, and the reasons why it cannot accept."""
+    with monkeypatch.context() as patch:
+        patch.setattr(listener.socket, "socket", Troubled)
+        return enter()
+
+
+def test_without_descriptors_clients_are_closed_at_once_and_the_log_says_so_once(troubled, monkeypatch):
+    """The one that is kept for it is given up for a moment."""
+    spare = troubled.spare
     spare.take()
-    monkeypatch.setattr(NoDescriptors, "given_up", lambda sock: spare._descriptor is None)
-    port = listen(loop, clients, notices, spare=spare)
-    monkeypatch.undo()
-    socks = [socket.create_connection(("127.0.0.1", port.number), timeout=TIMEOUT) for _ in range(3)]
-    loop.add(Turns(loop, clients, 3))
-    monkeypatch.setattr(NoDescriptors, "given_up", lambda sock: spare._descriptor is None)
-    loop.run()
+    monkeypatch.setattr(
+        Troubled, "trouble", lambda sock: None if spare._descriptor is None else NO_DESCRIPTORS
+    )
+    socks = [troubled.connect() for _ in range(3)]
+    troubled.turn(3)
     assert [sock.recv(1) for sock in socks] == [b"", b"", b""]
-    assert notices == [
-        f"clients are turned away from dashboard port {port.number}: Too many open files",
-    ]
+    number = troubled.port.number
+    assert troubled.notices == [f"clients are turned away from dashboard port {number}: Too many open files"]
     assert os.fstat(spare._descriptor)
-    spare.close()
-    close_all(port, clients, *socks)
 
 
-def test_a_port_that_cannot_even_refuse_pauses_instead_of_spinning(loop, monkeypatch):
-    monkeypatch.setattr(listener.socket, "socket", NoDescriptors)
-    clients = Clients()
-    port = listen(loop, clients)
-    assert is_watched(loop, port)
-    port._accept(selectors.EVENT_READ)
-    assert not is_watched(loop, port)
+def test_a_port_that_cannot_even_refuse_pauses_instead_of_spinning(troubled, monkeypatch):
+    monkeypatch.setattr(Troubled, "trouble", lambda sock: NO_DESCRIPTORS)
+    assert troubled.is_watched
+    troubled.port._accept(selectors.EVENT_READ)
+    assert not troubled.is_watched
     seen = []
-    loop.call_later(0.9 * PAUSE, lambda: seen.append(is_watched(loop, port)), pytest.fail)
-    run_for(loop, 1.1 * PAUSE)
+    troubled.loop.call_later(0.9 * PAUSE, lambda: seen.append(troubled.is_watched), pytest.fail)
+    troubled.run_for(1.1 * PAUSE)
     assert seen == [False]
-    assert is_watched(loop, port)
-    port._accept(selectors.EVENT_READ)
-    assert not is_watched(loop, port)
-    close_all(port, clients)
-    run_for(loop, 1.1 * PAUSE)
-    assert not loop._timers
+    assert troubled.is_watched
+    troubled.port._accept(selectors.EVENT_READ)
+    assert not troubled.is_watched
+    troubled.port.close()
+    troubled.run_for(1.1 * PAUSE)
+    assert not troubled.loop._timers
 
 
-def run_for(loop, duration):
-    loop._stopping = False
-    loop.call_later(duration, loop.stop, pytest.fail)
-    loop.run()
+def test_a_client_that_has_gone_while_it_waited_harms_nobody(troubled, monkeypatch):
+    errors = [GONE]
+    monkeypatch.setattr(Troubled, "trouble", lambda sock: errors.pop() if errors else None)
+    troubled.connect()
+    troubled.port._accept(selectors.EVENT_READ)
+    assert len(troubled.connections) == 1
+    assert not errors
 
 
-def is_watched(loop, port):
-    return port._sock in loop._selector.get_map()
+BROWSERS = ("GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS", "CONNECT", "TRACE")
 
 
-def test_a_client_that_has_gone_while_it_waited_harms_nobody(loop, monkeypatch):
-    class Gone(socket.socket):
-        left = 1
-
-        def accept(self):
-            if Gone.left:
-                Gone.left -= 1
-                raise ConnectionAbortedError(errno.ECONNABORTED, "Software caused connection abort")
-            return super().accept()
-
-    monkeypatch.setattr(listener.socket, "socket", Gone)
-    clients = Clients()
-    port = listen(loop, clients)
-    monkeypatch.undo()
-    sock = socket.create_connection(("127.0.0.1", port.number), timeout=TIMEOUT)
-    port._accept(selectors.EVENT_READ)
-    assert len(clients.connections) == 1
-    close_all(port, clients, sock)
-
-
-@pytest.mark.parametrize(
-    ("data", "is_let_in"), [(b"POST / HTTP/1.1\r\n\r\nstop program\n", False), (b"POSTED = 1\n", True)]
-)
-def test_a_page_in_a_browser_reaches_no_port_that_speaks_no_http(loop, data, is_let_in):
-    clients, notices = Clients(), []
-    port = listen(loop, clients, notices)
-    with socket.create_connection(("127.0.0.1", port.number), timeout=TIMEOUT) as sock:
-        sock.sendall(data)
-        loop.add(Turns(loop, clients, 5))
-        loop.run()
-        assert clients.heard == [data] * is_let_in
-        assert len(clients.connections) == is_let_in
-        refused = f"is a browser, which dashboard port {port.number} is not for"
-        assert any(refused in line for line in notices) is not is_let_in
-    close_all(port, clients)
+@pytest.mark.parametrize("words", [*BROWSERS, "POSTED = 1"])
+def test_a_page_in_a_browser_reaches_no_port_that_speaks_no_http(enter, words):
+    is_let_in = words not in BROWSERS
+    data = words.encode() + (b"\n" if is_let_in else b" / HTTP/1.1\r\n\r\nstop program\n")
+    entrance = enter()
+    entrance.connect().sendall(data)
+    entrance.turn(5)
+    assert entrance.heard == [data] * is_let_in
+    assert len(entrance.connections) == is_let_in
+    refused = f"is a browser, which dashboard port {entrance.port.number} is not for"
+    assert any(refused in line for line in entrance.notices) is not is_let_in
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems do not say what a client has read")
 @pytest.mark.parametrize("buffer", [4096, 1 << 20])
-def test_the_box_knows_whether_a_client_has_ever_read(loop, buffer):
-    clients = Clients()
-    port = listen(loop, clients)
-    with socket.socket() as sock:
-        sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, buffer)
-        sock.connect(("127.0.0.1", port.number))
-        loop.add(Turns(loop, clients, 1))
-        loop.run()
-        (connection,) = clients.connections
-        while connection.send(bytes(1000)):
-            pass
-        for _ in range(50):  # bytes between the kernels count for neither side, until they have come
-            loop.add(Turns(loop, clients, 100))
-            loop.run()
-            if not connection.has_read:
-                break
-        assert not connection.has_read
-        assert sock.recv(1)
-        while not connection.has_read:
-            pass  # what it has confirmed late is counted twice until then
-    close_all(port, clients)
+def test_the_box_knows_whether_a_client_has_ever_read(enter, buffer):
+    entrance, sock = enter(), socket.socket()
+    entrance.socks.append(sock)
+    sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, buffer)
+    sock.connect(entrance.address)
+    entrance.turn(1)
+    (connection,) = entrance.connections
+    assert connection._sock.getsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE)  # a silent one is asked
+    while connection.send(bytes(1000)):
+        pass
+    for _ in range(50):  # bytes between the kernels count for neither side, until they have come
+        entrance.turn(100)
+        if not connection.has_read:
+            break
+    assert not connection.has_read
+    assert sock.recv(1)
+    while not connection.has_read:
+        pass  # what it has confirmed late is counted twice until then
 
 
-def test_silent_clients_are_asked_whether_they_are_still_there(loop):
-    clients = Clients()
-    port = listen(loop, clients)
-    sock = socket.create_connection(("127.0.0.1", port.number), timeout=TIMEOUT)
-    loop.add(Turns(loop, clients, 1))
-    loop.run()
-    (connection,) = clients.connections
-    assert connection._sock.getsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE)
-    close_all(port, clients, sock)
-
-
-def test_an_address_of_another_machine_is_distinguished_from_a_taken_port(loop):
+def test_an_address_of_another_machine_is_distinguished_from_a_taken_port(enter):
     with pytest.raises(PortError, match=r"192\.0\.2\.1 is not an address of this machine"):
-        listen(loop, Clients(), host="192.0.2.1")
+        enter(host="192.0.2.1")

@@ -105,7 +105,10 @@ def test_signals_of_every_type_go_there_and_back_on_one_connection(box):
         'modbus_set_runstate_dependent_choice("coil", 1)',
         'modbus_set_output_signal("coil", True, False)',
         'modbus_set_output_register("out", 4711, False)',
-        until("read_port_register(150) == 4711 and get_standard_digital_out(1)"),
+        f'modbus_send_custom_command("127.0.0.1:{port}", 255, 6, [0, 160, 18, 52])',
+        until(
+            "read_port_register(150) == 4711 and read_port_register(160) == 4660 and get_standard_digital_out(1)"
+        ),
         'textmsg("set")',
         n=2,
     )

@@ -266,6 +266,9 @@ def test_a_connection_that_is_refused_is_tried_again_and_again_more_and_more_rar
     assert pauses[-1] == pytest.approx(LAST_RETRY)
     assert s.trouble == "10.0.0.2:502 refuses the connection"
     assert s.connection_error == DISCONNECTED
+    wire.link.reset()
+    wire.advance()
+    assert wire.next_call - wire.now == pytest.approx(FIRST_RETRY)
     wire.refuse = False
     wire.advance(LAST_RETRY)
     read_7(wire, s)
@@ -380,6 +383,10 @@ def test_answers_with_wrong_transaction_numbers_are_dropped_then_end_the_connect
         wire.answer(transaction + 1 + i, bytes.fromhex("04020063"))
     assert not wire.sock.is_open
     assert s.values == (7,)
+    wire.want(s)
+    wire.advance(FIRST_RETRY)
+    wire.answer(transaction, bytes.fromhex("04020063"))  # it counts anew
+    assert wire.sock.is_open
 
 
 @pytest.mark.parametrize(("code", "name"), [(2, "illegal data address"), (99, "unknown")])

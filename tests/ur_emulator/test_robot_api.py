@@ -138,6 +138,7 @@ def test_power_up_is_answered_when_it_is_done_and_refused_in_an_emergency_stop(b
     assert ask(box, "GET", "/robotstate/v1/safetymode")[1]["mode"] == "NORMAL"
     box.emergency_stop()
     assert ask(box, "GET", "/robotstate/v1/safetymode")[1]["mode"] == "EMERGENCY_STOP"
+    box.wait_until(robot_mode="POWER_OFF")
     assert power(box, "POWER_ON") == (409, "POWER_OFF")
     box.release_emergency_stop()
     assert power(box, "BRAKE_RELEASE") == (409, "POWER_OFF")

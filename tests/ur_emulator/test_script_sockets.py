@@ -176,6 +176,27 @@ def test_beyond_the_queue_and_without_threads_a_look_up_is_refused(monkeypatch):
     assert not LookUps().start(asked[0])
 
 
+def test_a_script_that_waits_for_a_name_may_be_stopped(box, monkeypatch):
+    resolver = Resolver(monkeypatch)
+    with connect(box, "secondary") as sock:
+        sock.sendall(program('socket_open("name.example", 80)').encode())
+        resolver.wait_for(1)
+        sock.sendall(b"stop program\n")
+        assert printed_by(box, 'textmsg("next")') == ["next"]
+    resolver.end()
+    assert printed_by(box, 'textmsg("on")') == ["on"]
+
+
+def test_names_that_are_not_known_or_not_looked_up_are_not_connected(box, monkeypatch):
+    assert printed_by(box, 'textmsg(socket_open("no such name", 80))') == ["False"]
+    monkeypatch.setattr(
+        sockets, "LOOK_UPS", SimpleNamespace(start=lambda one: False, forget=lambda one: None)
+    )
+    assert printed_by(box, 'textmsg(socket_open("name.example", 80))') == ["False"]
+    assert log_lines(box, "the name is not known")
+    assert log_lines(box, "names are being looked up already")
+
+
 # --- bytes
 
 
@@ -210,7 +231,7 @@ textmsg("all")"""
 
 
 def test_an_inbox_is_bounded_and_held_back_is_not_lost(box, monkeypatch):
-    lower(monkeypatch, inbox_bytes=20_000)
+    lower(monkeypatch, inbox_bytes=10_000)
     n, lines = 2, 2_000
     data = b"".join(b"%07d\n" % i for i in range(lines))
     network = inside(box)._network
@@ -226,7 +247,7 @@ def test_an_inbox_is_bounded_and_held_back_is_not_lost(box, monkeypatch):
         while not (said := log_lines(box, "all") + log_lines(box, "wrong")):
             most = max([most, *(one._unread for one in tuple(network._buffers.connections))])
         assert said == ["all"]
-        assert most < 20_000 + sockets._READ_SIZE
+        assert most < 10_000 + sockets._READ_SIZE
         for sender in senders:
             sender.join(TIMEOUT)
 

@@ -69,6 +69,9 @@ class PortBench(Bench):
     def new_sender(self):
         return Sender()
 
+    def closed(self, sender):
+        pass
+
     def received(self, sender, data):
         self.taken.append(data)
 
@@ -183,6 +186,7 @@ def test_read_only_ports_take_no_script():
     for port in bench.ports:
         client = Client(port)
         port.received(client, b"stop program\ntextmsg(1)\n")
+        client.close()
     assert len(bench.taken) == 2  # on 30001 and 30002
 
 
