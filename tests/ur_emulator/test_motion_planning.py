@@ -129,16 +129,6 @@ def test_motion_version_2_keeps_a_given_time_and_clamps_what_is_too_fast():
     assert not bench.errors
 
 
-def test_motion_version_is_1_again_for_a_program_that_was_loaded():
-    bench = ESeriesBench(fidelity="exact")
-    bench.run(program("motion_version_set(2)"))
-    bench.run(program("global sent = motion_version_get()"))
-    assert bench["sent"] == 2
-    bench.start(program("global played = motion_version_get()"), loaded=True)
-    bench.tick(3)
-    assert bench["played"] == 1
-
-
 def test_optimovej_blends_into_the_next_move():
     bench, q = targets(f"optimovej({GOAL}, a=0.2, v=0.3, r=0.05)", "movej([0.2, -1.7, -1.8, -0.3, 1.4, 1.7])")
     speeds = np.linalg.norm(np.diff(q, axis=0) / DT, axis=1)
