@@ -68,7 +68,7 @@ def test_moments_are_those_of_the_model_and_know_the_payload():
 @pytest.mark.parametrize(
     "act",
     [
-        lambda plant: plant.push((50.0, 0.0, 0.0)),
+        lambda plant: plant.push((50.0, 0.0, 0.0), (0.0, 0.0, 0.0), 1.0),
         lambda plant: plant.attach_load(3.0),
         lambda plant: plant.put(Thing("box", "sphere", (0.1,), 0.0, 0.3, (0.4, 0.0, 0.3, 0.0, 0.0, 0.0))),
     ],
@@ -77,6 +77,7 @@ def test_what_would_act_on_the_arm_is_refused_in_one_line(act):
     plant = ExactPlant(UR3, EXACT, 0)
     with pytest.raises(RefusedError, match="nothing acts on an arm of fidelity exact"):
         act(plant)
+    assert not plant.push_left
     plant.push((0.0, 0.0, 0.0))  # a zero force ends it
 
 
