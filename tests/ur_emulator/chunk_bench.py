@@ -142,8 +142,7 @@ class ChunkRun:
             case "ScriptFailed":
                 self.errors.append((event.secondary, event.line, event.column, event.text))
             case "ErrorReported":
-                is_grave = event.level in (ReportLevel.VIOLATION, ReportLevel.FAULT)
-                level = f"{event.level.name.lower()} " if is_grave else ""
+                level = "" if event.level is ReportLevel.WARNING else f"{event.level.name.lower()} "
                 self.events.append(f"{level}C{event.code}A{event.argument} {event.text}")
             case "SafetyModeChanged":
                 self.events.append(f"safety {_mode_name(event.safety_mode)}")

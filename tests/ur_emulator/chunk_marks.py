@@ -9,8 +9,8 @@ Chunks stand apart by a line `---`; lines count from the first of the chunk. A l
                         several: all compile errors in order
     #sec! 1:5 text      the same of a secondary program
     #~ wire text        what the first error puts into the runtime-exception message
-    #event text         the next thing the box reports beside texts: `C204A0 Protective Stop: ...` (`violation`, `fault`
-                        before those of that level),
+    #event text         the next thing the box reports beside texts: `C204A0 Protective Stop: ...` (`info`, `violation`
+                        or `fault` before it if it is no warning),
                         `safety PROTECTIVE_STOP`, `popup title: text`, `asks integer: text`,
                         `log source: text` (all, in order)
     #life text          the next thing that happens to the program: `started p`, `stopped p` (all, if any)

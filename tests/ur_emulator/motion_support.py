@@ -81,6 +81,13 @@ def run_cycles(motion, n):
     return [motion.step(DT, 1.0) for _ in range(n)]
 
 
+def renew(motion, command, n):
+    """Run an ArmMotion for n cycles, in each of which the command is renewed."""
+    for _ in range(n):
+        command.is_renewed = True
+        motion.step(DT, 1.0)
+
+
 class Swing:
     """Displaces the tool along base z, smoothly from rest."""
 

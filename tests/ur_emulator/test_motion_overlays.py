@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from motion_support import DT, HOME, START, TOOL, Swing, at, line, run_cycles
+from motion_support import DT, HOME, START, TOOL, Swing, at, line, renew, run_cycles
 
 from protocol.pose import pose_trans
 from ur_emulator.machine.controller.io.encoders import RANGES, Encoder
@@ -103,9 +103,7 @@ def test_a_stream_goes_on_from_the_displaced_target(motion):
     swing = Swing()
     motion.add_overlay(swing)
     command = motion.command("me", SpeedJ((0.1,) * 6, 2.0))
-    for _ in range(60):
-        command.is_renewed = True
-        motion.step(DT, 1.0)
+    renew(motion, command, 60)
     before = motion.target
     motion.remove_overlay(swing)
     command.is_renewed = True

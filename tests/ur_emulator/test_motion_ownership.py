@@ -9,7 +9,7 @@ import re
 
 import numpy as np
 import pytest
-from motion_support import DT, HOME, START, TOOL, Swing, line, run_cycles
+from motion_support import DT, HOME, START, TOOL, Swing, line, renew, run_cycles
 
 from protocol.pose import pose_trans
 from ur_emulator.machine.motion.arm_motion import ArmMotion, OwnershipError
@@ -208,9 +208,7 @@ def test_a_paused_stream_that_goes_on_before_it_rests_keeps_its_speed():
 def test_a_stream_that_was_lost_is_renewed_where_it_is():
     motion = ArmMotion(HOME, 20.0)
     command = motion.command("me", SpeedJ(QD, 2.0))
-    for _ in range(100):
-        command.is_renewed = True
-        motion.step(DT, 1.0)
+    renew(motion, command, 100)
     run_cycles(motion, 3)
     assert motion.state is ArmState.BRAKING
     assert command.fate is Fate.SUSPENDED

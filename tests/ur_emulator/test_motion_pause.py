@@ -6,7 +6,19 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from motion_support import DT, HOME, START, TOOL, Swing, at, distance_to_polyline, line, positions, run_cycles
+from motion_support import (
+    DT,
+    HOME,
+    START,
+    TOOL,
+    Swing,
+    at,
+    distance_to_polyline,
+    line,
+    positions,
+    renew,
+    run_cycles,
+)
 
 from ur_emulator.machine.models.robot_model import ZERO6
 from ur_emulator.machine.motion.arm_motion import ArmMotion
@@ -109,9 +121,7 @@ def test_a_pause_rests_after_a_quarter_of_a_second_and_lasts_as_long_as_it_is_as
 )
 def test_a_stream_ramps_to_rest_and_goes_on_if_it_is_renewed(motion, stream):
     command = motion.command("me", stream)
-    for _ in range(40):
-        command.is_renewed = True
-        motion.step(DT, 1.0)
+    renew(motion, command, 40)
     motion.pause()
     before = motion.target
     while not motion.is_paused:
@@ -120,9 +130,7 @@ def test_a_stream_ramps_to_rest_and_goes_on_if_it_is_renewed(motion, stream):
         assert change <= PAUSE_DECELERATION * DT * 1.001
         before = after
     motion.resume()
-    for _ in range(200):
-        command.is_renewed = True
-        motion.step(DT, 1.0)
+    renew(motion, command, 200)
     if isinstance(stream, SpeedJ):
         assert motion.target.qd == pytest.approx((0.5,) * 6)
     else:
@@ -133,9 +141,7 @@ def test_a_stream_ramps_to_rest_and_goes_on_if_it_is_renewed(motion, stream):
 
 def test_a_stream_that_nobody_renews_after_the_pause_stays_at_rest(motion):
     command = motion.command("me", SpeedJ((0.5,) * 6, 2.0))
-    for _ in range(20):
-        command.is_renewed = True
-        motion.step(DT, 1.0)
+    renew(motion, command, 20)
     motion.pause()
     run_cycles(motion, 60)
     q = motion.target.q
@@ -224,9 +230,7 @@ def test_overlays_stand_still_in_a_pause(motion):
 def test_a_stream_under_an_overlay_comes_to_rest_without_a_jump(motion):
     motion.add_overlay(Swing())
     command = motion.command("me", SpeedJ((1.5, 0, 0, 0, 0, 0), 4.0))
-    for _ in range(60):
-        command.is_renewed = True
-        motion.step(DT, 1.0)
+    renew(motion, command, 60)
     targets = [motion.target]
     motion.pause()
     while not motion.is_paused:

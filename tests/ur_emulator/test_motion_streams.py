@@ -11,7 +11,7 @@ from motion_support import ARM, DT, HOME, START, TOOL, tool_accelerations, tool_
 
 from protocol.pose import pose_sub
 from ur_emulator.machine.models.robot_model import ZERO6
-from ur_emulator.machine.motion.arm_motion import ArmMotion, OwnershipError
+from ur_emulator.machine.motion.arm_motion import ArmMotion
 from ur_emulator.machine.motion.generators import LOST_DECELERATION, JointTarget, ServoJ, SpeedJ, StopJ
 from ur_emulator.machine.motion.leg import move_j
 from ur_emulator.machine.motion.move import Move
@@ -190,45 +190,6 @@ def test_movej_arrives_exactly_and_keeps_the_limits_of_the_leading_axis(start, g
     assert targets[-1].qd == ZERO6
     assert max(abs(x) for t in targets for x in t.qd) <= v * (1 + 1e-9)
     assert max(abs(x) for t in targets for x in t.qdd) <= a * (1 + 1e-9)
-
-
-def test_only_the_owner_moves_the_arm_until_it_rests():
-    motion = ArmMotion(ZERO6, 20.0)
-    first, second = object(), object()
-    motion.command(first, SpeedJ((0.1,) * 6, 10.0))
-    with pytest.raises(OwnershipError):
-        motion.command(second, StopJ(2.0))
-    motion.release(first)
-    motion.command(second, StopJ(2.0))
-    assert motion.owner is second
-
-
-def test_a_velocity_lives_only_while_it_is_renewed():
-    motion = ArmMotion(ZERO6, 20.0)
-    owner = object()
-    for _ in range(20):
-        motion.command(owner, SpeedJ((0.2,) * 6, 5.0))
-        motion.step(DT, 1.0)
-    assert motion.target.qd == (0.2,) * 6
-    motion.step(DT, 1.0)  # nobody renewed it: the arm begins to stop, at the acceleration of the last command
-    assert motion.target.qd[0] == pytest.approx(0.2 - 5.0 * DT)
-    motion.command(owner, SpeedJ((0.2,) * 6, 5.0))
-    motion.step(DT, 1.0)
-    assert motion.target.qd[0] == pytest.approx(0.2)
-
-
-def test_the_end_of_the_owner_stops_the_arm_with_a_ramp():
-    motion = ArmMotion(ZERO6, 20.0)
-    owner = object()
-    for _ in range(50):
-        motion.command(owner, SpeedJ((1.0,) * 6, 5.0))
-        motion.step(DT, 1.0)
-    motion.release(owner)
-    speeds = [motion.step(DT, 1.0).qd[0] for _ in range(20)]
-    drops = [a - b for a, b in itertools.pairwise([1.0, *speeds])]
-    assert max(drops) <= 20.0 * DT * (1 + 1e-9)
-    assert speeds[-1] == 0.0
-    assert not motion.is_moving
 
 
 # What a program does in a cycle: it streams a speed, lets the stream lapse, or commands a stop.

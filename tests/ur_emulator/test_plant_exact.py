@@ -7,11 +7,8 @@ import math
 import pytest
 from box_support import Bench
 
-from protocol.ur_types import ControlMode
 from ur_emulator.errors import PlantError, RefusedError
-from ur_emulator.machine.commands.power import StartFreedrive
 from ur_emulator.machine.commands.programs import SetSpeedSlider
-from ur_emulator.machine.commands.surroundings import Push
 from ur_emulator.machine.models.cb3_arms import UR3
 from ur_emulator.machine.models.fidelity import EXACT
 from ur_emulator.machine.models.things import Thing
@@ -59,14 +56,6 @@ def test_measured_equals_asked_in_every_cycle_of_every_kind_of_motion():
     assert not bench.controller.programs.is_running
 
 
-def test_pose_and_force_follow_the_tool_centre_point():
-    bench = Bench(fidelity="exact")
-    *_, now = run(bench, "def p():\n  set_tcp(p[0, 0, 0.1, 0, 0, 0])\n  sync()\nend\n", 3)
-    flange = bench.controller.state.arm.fk(now.target_q)
-    assert math.dist(now.actual_tcp_pose[:3], flange[:3]) == pytest.approx(0.1)
-    assert now.actual_tcp_force == (0.0,) * 6
-
-
 def test_moments_are_those_of_the_model_and_know_the_payload():
     bench, other = Bench(fidelity="exact"), Bench(fidelity="ideal")
     for one in (bench, other):
@@ -79,7 +68,7 @@ def test_moments_are_those_of_the_model_and_know_the_payload():
 @pytest.mark.parametrize(
     "act",
     [
-        lambda plant: plant.push((50.0, 0.0, 0.0)),
+        lambda plant: plant.push((50.0, 0.0, 0.0), (0.0, 0.0, 0.0), 1.0),
         lambda plant: plant.attach_load(3.0),
         lambda plant: plant.put(Thing("box", "sphere", (0.1,), 0.0, 0.3, (0.4, 0.0, 0.3, 0.0, 0.0, 0.0))),
     ],
@@ -88,23 +77,8 @@ def test_what_would_act_on_the_arm_is_refused_in_one_line(act):
     plant = ExactPlant(UR3, EXACT, 0)
     with pytest.raises(RefusedError, match="nothing acts on an arm of fidelity exact"):
         act(plant)
+    assert not plant.push_left
     plant.push((0.0, 0.0, 0.0))  # a zero force ends it
-
-
-def test_a_refused_push_takes_no_time():
-    bench = Bench(fidelity="exact")
-    before = bench.now.actual_q
-    bench.tick(20, Push((50.0, 0.0, 0.0), duration=1.0))
-    assert bench.now.actual_q == before
-    assert not bench.controller.plant.push_left
-
-
-def test_an_arm_in_freedrive_stands_still():
-    bench = Bench(fidelity="exact")
-    before = bench.now.actual_q
-    bench.tick(20, StartFreedrive())
-    assert bench.now.control_mode == ControlMode.TEACH
-    assert bench.now.actual_q == bench.now.target_q == before
 
 
 def test_two_seeds_are_the_same_arm():

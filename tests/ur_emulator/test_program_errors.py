@@ -29,7 +29,6 @@ from ur_emulator.host.ports.primary.robot_state import StateEncoder
 from ur_emulator.machine.commands.programs import ResumeProgram, StartProgram
 from ur_emulator.machine.commands.safety import UnlockProtectiveStop
 from ur_emulator.machine.controller import events
-from ur_emulator.machine.controller.events import ErrorReported
 from ur_emulator.machine.models.generations import CB3
 from urscript import compile_program
 
@@ -132,30 +131,6 @@ def test_the_secondary_port_reports_nothing_but_states():
         port.send_message(event)
     sent = [decode_package(package, VERSION) for package in client.sent]
     assert [type(package) for package in sent] == [RobotState]  # of the stop
-
-
-OVERLAPPING = (
-    "def f():\n  movej([0.5,-1.5,-1.8,0,1.2,1.5], a=8, v=3)\n  p1 = get_target_tcp_pose()\n"
-    "  movel(pose_add(p1, p[0.05,0,0,0,0,0]), r=0.04)\n  movel(pose_add(p1, p[0.06,0,0,0,0,0]), r=0.04)\n"
-    "  movel(pose_add(p1, p[0.06,0.05,0,0,0,0]))\nend\n"
-)
-
-
-@pytest.mark.parametrize(
-    ("program", "code", "level"),
-    [
-        ("protective_stop()\n", 209, ReportLevel.WARNING),
-        ("def f():\n  movel(p[10,0,0,0,0,0])\nend\n", 204, ReportLevel.WARNING),
-        ('def f():\n  rtde_set_watchdog("input_int_register_24", 50)\n  sleep(1)\nend\n', 207, ReportLevel.WARNING),
-        (OVERLAPPING, 0, ReportLevel.WARNING),
-    ],
-)  # fmt: skip
-def test_codes_and_levels(program, code, level):
-    bench = Bench(fidelity="exact")
-    bench.start(program)
-    bench.tick(400)
-    (report,) = [e for e in bench.events if isinstance(e, ErrorReported)]
-    assert (report.code, report.level) == (code, level)
 
 
 def test_on_the_wire_a_code_has_its_argument(box):

@@ -7,18 +7,11 @@ import numpy as np
 import pytest
 from box_support import Bench, FrameReader, MessageReader, connect
 
-from protocol.primary.layout import RobotModeData
 from protocol.primary.messages import KeyMessage, TextMessage
-from protocol.rtde.types import RobotStatusBits
 from protocol.ur_types import ProgramState
 from ur_emulator import ControlBox
-from ur_emulator.host.ports.primary.robot_state import state_records
 from ur_emulator.machine.commands.power import ReleaseBrakes, StartFreedrive
-from ur_emulator.machine.commands.programs import (
-    PauseProgram,
-    ResumeProgram,
-    StopProgram,
-)
+from ur_emulator.machine.commands.programs import PauseProgram, ResumeProgram, StopProgram
 from ur_emulator.machine.commands.safety import TriggerProtectiveStop, UnlockProtectiveStop
 from ur_emulator.machine.models.generations import CB3, E_SERIES
 
@@ -212,32 +205,3 @@ def test_words_of_a_client_pause_and_resume(box):
         assert told.message(TextMessage).text == "there"
         assert told.message(KeyMessage).title == "PROGRAM_XXX_STOPPED"
         reader.until(lambda f: f.runtime_state == ProgramState.STOPPED)
-
-
-def flags(snapshot):
-    """Running and paused as robot mode data say, running as RTDE says."""
-    (mode,) = [record for record in state_records(snapshot) if isinstance(record, RobotModeData)]
-    rtde = bool(snapshot.robot_status_bits & RobotStatusBits.PROGRAM_RUNNING)
-    return mode.is_program_running, mode.is_program_paused, rtde
-
-
-def test_flags_of_the_states(bench):
-    bench.start(SLOW_MOVE)
-    bench.tick(40)
-    bench.tick(60, PAUSE)
-    bench.tick(300, RESUME)
-    seen = {ProgramState(s.runtime_state): flags(s) for s in bench.snapshots}
-    running, paused, stopped = (True, False, True), (False, True, False), (False, False, False)
-    assert seen == {
-        ProgramState.PLAYING: running,
-        ProgramState.PAUSING: running,
-        ProgramState.PAUSED: paused,
-        ProgramState.RESUMING: running,
-        ProgramState.STOPPED: stopped,
-    }
-    # The public client library waits for that after `stop program` in a pause.
-    bench.start(SLOW_MOVE)
-    bench.tick(40)
-    bench.tick(5, PAUSE)
-    bench.tick(1, STOP)
-    assert flags(bench.now) == stopped

@@ -209,14 +209,6 @@ def test_programs_that_follow_each_other_within_a_cycle_are_distinguished(client
     ]
 
 
-def test_only_the_primary_port_reports_variables_and_labels():
-    bench = PortBench(all_messages=False)
-    client = bench.client()
-    bench.start('def p():\n  $ 1 "Robot Program"\n  global a = 1\n' + FOREVER)
-    bench.tick(50)
-    assert client.packages() == []
-
-
 def test_while_nobody_listens_nobody_looks(monkeypatch):
     def look(*_):
         raise AssertionError("somebody looks at the variables")
@@ -498,12 +490,6 @@ def test_a_program_without_labels_is_not_watched(bench):
 )
 def test_lines_of_labels(line, label):
     assert parse_label(line) == label
-
-
-def test_a_label_that_is_none_is_not_reported(client, bench):
-    bench.start("def p():\n  $ nonsense\n" + FOREVER)
-    bench.tick(20)
-    assert not [p for p in client.packages() if isinstance(p, ProgramThreadsMessage)]
 
 
 def test_on_the_wire():
