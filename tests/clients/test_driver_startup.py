@@ -7,6 +7,7 @@ than the software announces, another arm than the one it was started for, recipe
 import re
 import struct
 from itertools import pairwise
+from pathlib import Path
 
 import pytest
 from clients_support import TIMEOUT, connect, served_box, submit, wait_until
@@ -37,22 +38,10 @@ UR_TYPES = {
     "ur3e": (3, "E"), "ur5e": (1, "E"), "ur7e": (1, "E"), "ur10e": (2, "E"), "ur12e": (2, "E"), "ur16e": (4, "E"),
     "ur8long": (6, "UR"), "ur15": (9, "UR"), "ur18": (5, "UR"), "ur20": (7, "UR"), "ur30": (8, "UR"),
 }  # fmt: skip
-# The recipes of the ROS 2 driver.
-DRIVER_OUTPUTS = (
-    "timestamp", "actual_q", "actual_qd", "speed_scaling", "target_speed_fraction", "runtime_state",
-    "actual_TCP_force", "actual_TCP_pose", "target_TCP_pose", "actual_digital_input_bits",
-    "actual_digital_output_bits", "standard_analog_input0", "standard_analog_input1",
-    "standard_analog_output0", "standard_analog_output1", "analog_io_types", "tool_mode",
-    "tool_analog_input_types", "tool_analog_input0", "tool_analog_input1", "tool_output_voltage",
-    "tool_output_current", "tool_temperature", "robot_mode", "safety_mode", "robot_status_bits",
-    "safety_status_bits", "actual_current", "tcp_offset", "payload", "payload_cog", "payload_inertia",
-)  # fmt: skip
-DRIVER_INPUTS = (
-    "speed_slider_mask", "speed_slider_fraction", "standard_digital_output_mask", "standard_digital_output",
-    "configurable_digital_output_mask", "configurable_digital_output", "tool_digital_output_mask",
-    "tool_digital_output", "standard_analog_output_mask", "standard_analog_output_type",
-    "standard_analog_output_0", "standard_analog_output_1",
-)  # fmt: skip
+# The recipes of the ROS 2 driver, in files of names as it has them.
+DRIVER_OUTPUTS, DRIVER_INPUTS = (
+    (Path(__file__).parent / f"driver_{way}.txt").read_text().split() for way in ("outputs", "inputs")
+)
 # First software of outputs that the driver leaves out where the robot does not have them.
 SINCE = {"payload_inertia": (5, 11)}
 # What the reader holds at most of a package.

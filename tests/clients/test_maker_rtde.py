@@ -6,52 +6,13 @@ Its home, UniversalRobots/RTDE_Python_Client_Library, is not on PyPI.
 import struct
 from contextlib import contextmanager
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
 from clients_support import PROGRAMS, served_box, submit
 from urpy.rtde import rtde, rtde_config
 
-# The recipe of the maker's recorder (examples/record_configuration.xml), and what later ones add to it.
-RECORDED = {
-    "timestamp": "DOUBLE",
-    **dict.fromkeys(
-        (
-            "target_q", "target_qd", "target_qdd", "target_current", "target_moment", "actual_q", "actual_qd",
-            "actual_current", "joint_control_output", "actual_TCP_pose", "actual_TCP_speed", "actual_TCP_force",
-            "target_TCP_pose", "target_TCP_speed",
-        ),
-        "VECTOR6D",
-    ),
-    "actual_digital_input_bits": "UINT64",
-    "joint_temperatures": "VECTOR6D",
-    "actual_execution_time": "DOUBLE",
-    "robot_mode": "INT32",
-    "joint_mode": "VECTOR6INT32",
-    "safety_mode": "INT32",
-    "actual_tool_accelerometer": "VECTOR3D",
-    **dict.fromkeys(
-        (
-            "speed_scaling", "target_speed_fraction", "actual_momentum", "actual_main_voltage",
-            "actual_robot_voltage", "actual_robot_current",
-        ),
-        "DOUBLE",
-    ),
-    "actual_joint_voltage": "VECTOR6D",
-    "actual_digital_output_bits": "UINT64",
-    "runtime_state": "UINT32",
-}  # fmt: skip
-ADDED = {
-    "safety_status": "INT32",
-    "joint_position_deviation_ratio": "DOUBLE",
-    "payload": "DOUBLE",
-    "payload_cog": "VECTOR3D",
-    "payload_inertia": "VECTOR6D",
-    "ft_raw_wrench": "VECTOR6D",
-    "script_control_line": "UINT32",
-    "tool_output_mode": "UINT8",
-    "output_bit_register_64": "BOOL",
-}
 SIZES = {
     "VECTOR6D": 48,
     "VECTOR3D": 24,
@@ -61,11 +22,7 @@ SIZES = {
     "INT32": 4,
     "UINT32": 4,
 }
-CONTROL_LOOP = {
-    "state": {"target_q": "VECTOR6D", "target_qd": "VECTOR6D", "output_int_register_0": "INT32"},
-    "setp": {f"input_double_register_{n}": "DOUBLE" for n in range(6)},
-    "watchdog": {"input_int_register_0": "INT32"},
-}
+recipe = rtde_config.ConfigFile(str(Path(__file__).with_name("maker_recipes.xml"))).get_recipe
 # Robot, software, control cycle [s].
 BOXES = [
     pytest.param(("ur3", "3.15.8", 0.008), id="3.15.8"),
@@ -81,24 +38,6 @@ def box(tmp_path_factory, request):
     with served_box(tmp_path_factory.mktemp("maker"), *options) as served:
         served.software, served.period = software, period
         yield served
-
-
-@pytest.fixture
-def recipes(tmp_path):
-    """Write recipes as the configuration file of an example and read it back."""
-
-    def read(**recipes):
-        rows = (
-            f'<recipe key="{key}">'
-            + "".join(f'<field name="{name}" type="{kind}"/>' for name, kind in fields.items())
-            + "</recipe>"
-            for key, fields in recipes.items()
-        )
-        path = tmp_path / "configuration.xml"
-        path.write_text(f'<?xml version="1.0"?>\n<rtde_config>{"".join(rows)}</rtde_config>\n')
-        return rtde_config.ConfigFile(path).get_recipe
-
-    return read
 
 
 @contextmanager
@@ -120,8 +59,8 @@ def newest(client):
     return client.receive()
 
 
-def test_recorders_get_rows_and_every_cycle_where_they_buffer(box, recipes):
-    names, types = recipes(out=RECORDED)("out")
+def test_recorders_get_rows_and_every_cycle_where_they_buffer(box):
+    names, types = recipe("recorded")
     with connected(box) as client:
         assert client.send_output_setup(names, types, frequency=125)
         assert client.send_start()
@@ -140,8 +79,8 @@ def test_recorders_get_rows_and_every_cycle_where_they_buffer(box, recipes):
     assert np.diff(stamps) == pytest.approx([box.period] * 199, abs=1e-9)
 
 
-def test_receive_skips_what_has_come_meanwhile(box, recipes):
-    names, types = recipes(out={"timestamp": "DOUBLE"})("out")
+def test_receive_skips_what_has_come_meanwhile(box):
+    names, types = recipe("stamp")
     with connected(box) as slow, connected(box) as clock:
         for client in (slow, clock):
             assert client.send_output_setup(names, types, frequency=round(1 / box.period))
@@ -153,8 +92,8 @@ def test_receive_skips_what_has_come_meanwhile(box, recipes):
         assert slow.skipped_package_count >= 15
 
 
-def test_later_recorders_need_later_software(box, recipes):
-    names, types = recipes(out=RECORDED | ADDED)("out")
+def test_later_recorders_need_later_software(box):
+    names, types = recipe("later")
     with connected(box) as client:
         if box.software in ("3.15.8", "5.9.4"):
             with pytest.raises(ValueError, match="NOT_FOUND"):
@@ -183,9 +122,8 @@ def test_a_package_of_a_later_protocol_does_not_end_the_connection(box):
         assert client.get_controller_version()[0] == int(box.software[0])
 
 
-def test_the_control_loop(box, recipes):
+def test_the_control_loop(box):
     """Two poses in turn over registers, a watchdog kicked with each state; without kicks the program pauses."""
-    recipe = recipes(**CONTROL_LOOP)
     with connected(box) as client, connected(box) as watcher:
         assert client.send_output_setup(*recipe("state"), frequency=round(1 / box.period))
         setp, watchdog = (client.send_input_setup(*recipe(name)) for name in ("setp", "watchdog"))

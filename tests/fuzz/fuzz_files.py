@@ -194,36 +194,31 @@ def _read_movement(path):
     movement.sample([0.0, 0.5 * movement.duration, movement.duration])
 
 
+def _of_client(samples, mutate, read):
+    return Target(samples, mutate, read, (ClientError,))
+
+
 CLIENT_FILES = {
-    "recording": Target(_recordings, mutations.mutate_mcap, _file(".mcap", _report), (ClientError,)),
-    "movement": Target(
-        _movement_samples, mutations.mutate_toml, _file(".toml", _read_movement), (ClientError,)
-    ),
-    "samples": Target(
-        lambda: (_SAMPLES,), mutations.mutate_table, _file(".csv", _read_movement), (ClientError,)
-    ),
-    "cell": Target(
+    "recording": _of_client(_recordings, mutations.mutate_mcap, _file(".mcap", _report)),
+    "movement": _of_client(_movement_samples, mutations.mutate_toml, _file(".toml", _read_movement)),
+    "samples": _of_client(lambda: (_SAMPLES,), mutations.mutate_table, _file(".csv", _read_movement)),
+    "cell": _of_client(
         lambda: _texts(ROOT / "examples" / "cell.toml"),
         mutations.mutate_toml,
         _file(".toml", partial(load_cell, kind=FILE_KINDS["cell"])),
-        (ClientError,),
     ),
-    "controller": Target(
+    "controller": _of_client(
         lambda: (b'base = "paper"\ngain_p = 10.0\ngain_i = 1.5\nuses_ilc = true\n',),
         mutations.mutate_toml,
         _file(".toml", Controller.from_toml),
-        (ClientError,),
     ),
-    "sweep": Target(
+    "sweep": _of_client(
         lambda: (b'movements = ["uniform_4_1"]\nseeds = [1, 2]\n[controller]\ngain_p = [1.0, 2.0]\n',),
         mutations.mutate_toml,
         _file(".toml", read_config),
-        (ClientError,),
     ),
-    "pen": Target(
-        lambda: (_PEN,), mutations.mutate_table, lambda data, folder: parse_pen(data, "a.csv"), (ClientError,)
-    ),
-    "archive": Target(_archives, mutations.mutate_zip, _file(".zip", _read_archive), (ClientError,)),
+    "pen": _of_client(lambda: (_PEN,), mutations.mutate_table, lambda data, folder: parse_pen(data, "a.csv")),
+    "archive": _of_client(_archives, mutations.mutate_zip, _file(".zip", _read_archive)),
 }
 
 
@@ -341,18 +336,8 @@ def _answers():
     return _Answers()
 
 
-_VALUES = (
-    1,
-    2.5,
-    "a text",
-    True,
-    [1, 2, 3],
-    [1.0, 2],
-    [[1, 2], [3, 4]],
-    [],
-    None,
-    dict.fromkeys(("x", "y", "z", "rx", "ry", "rz"), 0.5),
-)
+_POSE = dict.fromkeys(("x", "y", "z", "rx", "ry", "rz"), 0.5)
+_VALUES = (1, 2.5, "a text", True, [1, 2, 3], [1.0, 2], [[1, 2], [3, 4]], [], None, _POSE)
 
 
 @cache

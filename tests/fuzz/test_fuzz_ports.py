@@ -31,6 +31,13 @@ def folder(tmp_path_factory):
     return write_programs(tmp_path_factory.mktemp("programs"))
 
 
+@pytest.fixture
+def fuzz(folder):
+    fuzz = FuzzBox(random.Random(1), folder, lively=False)
+    yield fuzz
+    fuzz.close()
+
+
 def repeat(do, n_times):
     for _ in range(n_times):
         do()
@@ -43,36 +50,29 @@ def test_no_bytes_harm_a_box_or_move_its_arm_unless_it_is_lively(folder, kind, l
     assert set(cases) >= set(MESSAGES) - NOT_THERE[kind]
 
 
-def test_the_harness_notices_an_arm_that_moves(folder):
-    fuzz = FuzzBox(random.Random(1), folder, lively=False)
+def test_the_harness_notices_an_arm_that_moves(fuzz):
     client, _ = fuzz.join("secondary")
     fuzz.send("secondary", client, b"movej([0, -1.57, 1.57, 0, 0, 0])\n")
     with pytest.raises(AssertionError, match="the arm moved"):
         repeat(fuzz.cycle, 200)
-    fuzz.close()
 
 
-def test_the_harness_notices_an_error_of_a_port(folder, monkeypatch):
-    fuzz = FuzzBox(random.Random(1), folder, lively=False)
+def test_the_harness_notices_an_error_of_a_port(fuzz, monkeypatch):
     monkeypatch.setattr(inside(fuzz.box)._port_set._ports["rtde"], "_find_streams", lambda: 1 / 0)
     with pytest.raises(AssertionError, match="ZeroDivisionError"):
         repeat(lambda: fuzz.attack("rtde"), 2000)
-    fuzz.close()
 
 
-def test_the_harness_notices_what_is_not_released(folder, monkeypatch):
-    fuzz = FuzzBox(random.Random(1), folder, lively=False)
+def test_the_harness_notices_what_is_not_released(fuzz, monkeypatch):
     monkeypatch.setattr(fuzz_box, "_LONGEST_QUEUE", 0.08)
     kept = socket.socket()
     with pytest.raises(AssertionError, match="descriptors"):
         fuzz.settle()
     kept.close()
-    fuzz.close()
 
 
-def test_a_flood_of_rtde_requests_is_answered_over_many_cycles(folder):
+def test_a_flood_of_rtde_requests_is_answered_over_many_cycles(fuzz):
     """64 KiB of the shortest request once held the loop for half a second."""
-    fuzz = FuzzBox(random.Random(1), folder, lively=False)
     (client, reader), n_requests = fuzz.join("rtde"), 2000
     client.send(b"\x00\x03P" * n_requests)
     fuzz.turn()
@@ -81,11 +81,9 @@ def test_a_flood_of_rtde_requests_is_answered_over_many_cycles(folder):
     for _ in range(n_requests // reader.n_replies + 5):
         fuzz.cycle()
     assert reader.n_replies == n_requests
-    fuzz.close()
 
 
-def test_rtde_packages_that_come_faster_than_they_are_answered_are_not_read(folder):
-    fuzz = FuzzBox(random.Random(1), folder, lively=False)
+def test_rtde_packages_that_come_faster_than_they_are_answered_are_not_read(fuzz):
     client, _ = fuzz.join("rtde")
     client.send(b"\x00\x03P" * 200_000)
     for _ in range(100):
@@ -95,12 +93,10 @@ def test_rtde_packages_that_come_faster_than_they_are_answered_are_not_read(fold
     client.take()
     assert client.is_open
     fuzz.cycle()
-    fuzz.close()
 
 
-def test_little_is_taken_from_a_client_in_a_turn(folder, monkeypatch):
+def test_little_is_taken_from_a_client_in_a_turn(fuzz, monkeypatch):
     """64 KiB of line breaks on a script port once kept a cycle waiting for 100 ms and more."""
-    fuzz = FuzzBox(random.Random(1), folder, lively=False)
     for port in PORTS:
         served, taken = inside(fuzz.box)._port_set._ports[port], []
 
@@ -114,4 +110,3 @@ def test_little_is_taken_from_a_client_in_a_turn(folder, monkeypatch):
         fuzz.turn()
         assert 0 < sum(taken) <= BUDGETS.read_bytes, port
         client.close()
-    fuzz.close()

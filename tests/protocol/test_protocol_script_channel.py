@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 from codec_ways import check_reading, in_pieces
 from hypothesis import given
@@ -9,52 +11,13 @@ from hypothesis import strategies as st
 
 from protocol.script_channel import MAX_LINE, ControlLine, Overflow, ProgramText, ScriptChannel
 
-NESTED = """\
-def outer():
-  # if this counted, end would not close
-  $ 1 "if while" "noBreak"
-  def inner(a, b):
-    if a == "if end def":
-      return b
-    elif a == 2:
-      return 3
-    else:
-      while (True): sync() end
-    end
-  end
-  thread t():
-    textmsg("# no comment, if")   # end
-  end
-  end_teach_mode()
-  if_not = 1 p_end = 2
-end
-"""
-
-# python-urx's blended moves: body in column 1; ur_modern_driver indents with tabs
-URX = """\
-def movexs():
-movel(p[0,0,0,0,0,0], a=0.1, v=0.1, r=0.02)
-movel(p[0,0,0.1,0,0,0], a=0.1, v=0.1, r=0)
-end
-"""
+# Nested blocks; a body in column 1 (the blended moves of python-urx); a value that ur_rtde has put into column 1.
+NESTED, URX, URRTDE = (
+    (Path(__file__).parent / "programs" / f"{name}.script").read_text()
+    for name in ("nested", "urx", "ur_rtde")
+)
+# ur_modern_driver indents with tabs.
 UMD = "def driverProg():\n\tMSTOP = 0\n\tdef set(q):\n\t\tenter_critical\n\tend\n\tsync()\nend\n"
-
-# ur_rtde splices register offsets in after a newline: a value in column 1, then the next statement
-URRTDE = """\
-def rtde_control():
-global reg_offset_float = # float register offset
-0    global reg_offset_int = # "int" register offset
-
-0    global force_mode_type = 2
-# a comment in column 1: def if while
-  while (True):
-    if (a == 1):  # if
-    elif (b == 2):
-    end
-    sync()
-  end
-end
-"""
 
 CASES = [
     ("nested blocks", NESTED, [ProgramText(NESTED, "outer", "def")]),

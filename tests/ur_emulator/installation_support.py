@@ -2,25 +2,10 @@
 
 import gzip
 from math import pi, tau
+from pathlib import Path
 
-SAFETY = """[SafetySetup]
-withPositionLimits = [true, true, true, true, true, false]
-verified = true
-
-[SafetyLimits Normal Joints]
-maxJointSpeed = [3.3415927, 3.3415927, 3.3415927, 6.4831853, 6.4831853, 6.4831853]
-minJointPosition = [6.2308254, 6.2308254, 6.2308254, 6.2308254, 6.2308254, 0.0]
-maxJointPosition = [0.0523599, 0.0523599, 0.0523599, 0.0523599, 0.0523599, 0.0]
-minJointRevolutions = [-2, -2, -2, -2, -2, -2147483648]
-maxJointRevolutions = [1, 1, 1, 1, 1, 2147483647]
-
-[SafetyLimits Reduced Joints]
-maxJointSpeed = [1.5, 1.5, 1.5, 3.0, 3.0, 3.0]
-
-[Safety Checksum]
-version = 3.2
-crc = 123456
-"""
+# As the file of an installation has them between <SafetySettings> and its end.
+SAFETY = (Path(__file__).parent / "safety_settings.txt").read_text()
 WIDE = 363.0 / 360.0 * tau
 
 TCP = """<TCPSettings activePose="Gripper" toolPayload="1.25" centerOfGravity="0.0, 0.01, 0.05"><availablePoses>

@@ -96,15 +96,23 @@ def test_an_installation_is_effective_when_it_is_loaded(box, dashboard, tmp_path
     assert (state.payload, state.payload_cog) == (1.25, (0.0, 0.01, 0.05))
 
 
-def test_a_program_takes_the_installation_that_it_names(box, dashboard, tmp_path):
-    table = pose_feature("table", (0.5, 0, 0, 0, 0, 0), is_variable=True)
-    (tmp_path / "cell.installation").write_bytes(installation(TCP, "<Features>", table, "</Features>"))
-    (tmp_path / "p.urp").write_bytes(urp(script_line("textmsg(table)"), installation="cell"))
+def first_text(box, dashboard, folder, parts, *lines):
+    """Play a program of these lines with an installation of these parts; return the first text that it shows."""
+    (folder / "cell.installation").write_bytes(installation(*parts))
+    (folder / "p.urp").write_bytes(urp("".join(map(script_line, lines)), installation="cell"))
     with connect(box, "primary") as sock:
         reader = MessageReader(sock)
         said = dashboard.ask_all("load p.urp", "play")
         assert said == ["Loading program: /programs/p.urp", "Starting program"]
-        assert reader.message(TextMessage).text == "p[0.5,0,0,0,0,0]"
+        text = reader.message(TextMessage).text
+    dashboard.until("programState", "STOPPED p.urp")
+    return text
+
+
+def test_a_program_takes_the_installation_that_it_names(box, dashboard, tmp_path):
+    table = pose_feature("table", (0.5, 0, 0, 0, 0, 0), is_variable=True)
+    parts = TCP, "<Features>", table, "</Features>"
+    assert first_text(box, dashboard, tmp_path, parts, "textmsg(table)") == "p[0.5,0,0,0,0,0]"
 
 
 def test_an_installation_that_the_arm_cannot_bear_is_said(box, dashboard, tmp_path):
@@ -116,16 +124,11 @@ def test_an_installation_that_the_arm_cannot_bear_is_said(box, dashboard, tmp_pa
 
 def test_the_limits_of_an_installation_bind_the_arm(box, dashboard, tmp_path):
     """The ranges of the joints count from its safety settings, and the speeds of reduced mode."""
-    narrow = SAFETY.replace("[1, 1, 1,", "[0, 1, 1,")
-    (tmp_path / "cell.installation").write_bytes(installation(f"<SafetySettings>{narrow}</SafetySettings>"))
-    nodes = script_line("textmsg(is_within_safety_limits([0, -1, 0, 0, 0, 0]))")
-    nodes += script_line("movej([1.0, -1.76, -2.1, -0.1, 1.3, 1.86])")
-    (tmp_path / "p.urp").write_bytes(urp(nodes, installation="cell"))
-    with connect(box, "primary") as sock:
-        reader = MessageReader(sock)
-        dashboard.ask_all("load p.urp", "play")
-        assert reader.message(TextMessage).text == "True"
-        dashboard.until("programState", "STOPPED p.urp")
+    parts = "<SafetySettings>", SAFETY.replace("[1, 1, 1,", "[0, 1, 1,"), "</SafetySettings>"
+    lines = (
+        "textmsg(is_within_safety_limits([0, -1, 0, 0, 0, 0]))", "movej([1.0, -1.76, -2.1, -0.1, 1.3, 1.86])",
+    )  # fmt: skip
+    assert first_text(box, dashboard, tmp_path, parts, *lines) == "True"
     assert any("joint 0 cannot be at 1 rad; allowed: -6.3355 to 0.0524" in entry.text for entry in box.log)
     limits = inside(box)._box.controller.state.safety.limits
     assert limits.reduced_speed == (1.5, 1.5, 1.5, 3.0, 3.0, 3.0)
@@ -198,14 +201,9 @@ LIMITS = SAFETY.replace("[1, 1, 1,", "[0, 1, 1,") + (
 def test_inverse_kinematics_and_what_clients_are_told_keep_the_limits_of_an_installation(
     box, dashboard, tmp_path
 ):
-    (tmp_path / "cell.installation").write_bytes(installation(f"<SafetySettings>{LIMITS}</SafetySettings>"))
-    q = "[1.0, -1.2, -1.7, -0.1, 1.2, 1.8]"
-    nodes = script_line(f"textmsg(get_inverse_kin(get_forward_kin({q}), {q})[0] < 0.06)")
-    (tmp_path / "p.urp").write_bytes(urp(nodes, installation="cell"))
-    with connect(box, "primary") as sock:
-        reader = MessageReader(sock)
-        dashboard.ask_all("load p.urp", "play")
-        assert reader.message(TextMessage).text == "True"
+    q, parts = "[1.0, -1.2, -1.7, -0.1, 1.2, 1.8]", ("<SafetySettings>", LIMITS, "</SafetySettings>")
+    line = f"textmsg(get_inverse_kin(get_forward_kin({q}), {q})[0] < 0.06)"
+    assert first_text(box, dashboard, tmp_path, parts, line) == "True"
     texts = " ".join(entry.text for entry in box.log)
     unknown = "SafetyLimits BoundaryPlane0 with the unknown mode FAR is not watched"
     assert f"/programs/cell.installation: {unknown}" in texts

@@ -27,6 +27,8 @@ from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import ProgramFileError
 from ur_emulator.machine.controller.events import ErrorReported, PopupShown, ScriptFailed
 from ur_emulator.machine.controller.io.network import SignalType
+from ur_emulator.machine.kinematics.arm_model import ArmModel
+from ur_emulator.machine.models.cb3_arms import UR5
 from ur_emulator.machine.models.robot_model import ZERO6
 from ur_emulator.program_files import urp_nodes
 from ur_emulator.program_files.folder import ProgramFolder
@@ -134,6 +136,12 @@ def test_a_script_file_of_a_node_is_read_where_it_lies(tmp_path):
 
 
 # --- positions of e-Series software
+
+
+def test_a_taught_pose_is_that_of_the_angles_and_the_tool(tmp_path):
+    program = urp(move("MoveL", waypoint("W", FIXED), CARTESIAN), saved_in=NEW)
+    pose = script_of(tmp_path, program).splitlines()[1].removeprefix("  global W_p=p[").removesuffix("]")
+    assert [float(one) for one in pose.split(",")] == pytest.approx(ArmModel(UR5).fk(Q, OFFSET), abs=1e-11)
 
 
 def test_a_path_goes_on_where_the_program_begins_again(tmp_path):
