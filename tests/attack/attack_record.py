@@ -25,10 +25,8 @@ class Attack:
         run: does it, for about so many seconds, never for more than a minute; may return a remark. An
             `AssertionError` or `OSError` says that the box has not behaved.
         kinds: names of the boxes that it applies to.
-        options: of `ur-emulator serve`.
-        prelude: Python code that the process of the box runs first.
-        unread_log: stderr is a pipe that nobody reads.
-        is_short: it makes sense within a moment, too, and belongs to `make test`.
+        unread_log: it needs a box of its own, whose log goes to a pipe that nobody reads.
+        is_short: it makes sense within a moment, too, and belongs to `make nightly`.
     """
 
     name: str
@@ -36,28 +34,13 @@ class Attack:
     limit: str
     run: Run
     kinds: tuple[str, ...] = tuple(KINDS)
-    options: tuple[str, ...] = ()
-    prelude: str = ""
     unread_log: bool = False
     is_short: bool = True
-
-    def __str__(self) -> str:
-        return self.name
-
-    @property
-    def is_special(self) -> bool:
-        """Whether it needs a box that is started for it."""
-        return bool(self.options or self.prelude or self.unread_log)
 
 
 @dataclass(slots=True)
 class Section:
-    """The attacks of a module.
-
-    Attributes:
-        title: what they have in common.
-        attacks: in the order of the table.
-    """
+    """The attacks of a module, in the order of the table."""
 
     title: str
     attacks: list[Attack] = field(default_factory=list)
@@ -92,7 +75,7 @@ class Outcome:
 
 def served(attack: Attack, kind: Kind) -> AbstractContextManager[BoxUnderAttack]:
     """Serve a box of this kind that an attack may begin with."""
-    return serving(kind, *attack.options, prelude=attack.prelude, unread_log=attack.unread_log)
+    return serving(kind, unread_log=attack.unread_log)
 
 
 def watched(attack: Attack, kind: Kind, seconds: float) -> Outcome:

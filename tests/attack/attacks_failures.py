@@ -15,7 +15,6 @@ FAILURES = Section("One boundary for failures")
 @FAILURES.attack(
     "`--log` goes to a pipe that nobody reads; dashboards add lines of 500 bytes",
     "lines are left out",
-    options=("--log",),
     unread_log=True,
     kinds=ONE,
 )

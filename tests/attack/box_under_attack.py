@@ -63,9 +63,6 @@ class Kind:
     software: str = ""
     options: tuple[str, ...] = ()
 
-    def __str__(self) -> str:
-        return self.name
-
 
 KINDS = {
     kind.name: kind
@@ -248,16 +245,13 @@ class BoxUnderAttack:
 
 
 @contextmanager
-def serving(
-    kind: Kind, *options: str, prelude: str = "", unread_log: bool = False
-) -> Iterator[BoxUnderAttack]:
+def serving(kind: Kind, *, prelude: str = "", unread_log: bool = False) -> Iterator[BoxUnderAttack]:
     """Serve a box in real time with an empty folder of programs and the control API.
 
     Args:
         kind: of box.
-        options: more options of `ur-emulator serve`.
         prelude: Python code that its process runs first.
-        unread_log: stderr is a pipe that nobody reads, instead of a file.
+        unread_log: its log goes to stderr, and that is a pipe that nobody reads, instead of a file.
     """
     with tempfile.TemporaryDirectory(prefix="attack-") as temporary:
         folder = Path(temporary)
@@ -278,7 +272,7 @@ def serving(
         ]
         with errors.open("w") as file:
             process = subprocess.Popen(
-                [*command, *options],
+                [*command, "--log"] if unread_log else command,
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.PIPE if unread_log else file,

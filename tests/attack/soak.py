@@ -86,7 +86,7 @@ def soak(minutes: float, kind: Kind) -> dict[str, Any]:
         attack
         for section in SECTIONS
         for attack in section.attacks
-        if kind.name in attack.kinds and not attack.is_special
+        if kind.name in attack.kinds and not attack.unread_log
     ]
     random.Random(1).shuffle(attacks)
     console = Console(width=160)

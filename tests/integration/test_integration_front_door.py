@@ -10,13 +10,11 @@ from types import SimpleNamespace
 import numpy as np
 import polars
 import pytest
-from scipy.spatial.transform import Rotation
 
 import pc_client as ur
 from pc_client.driver import report
 from pc_client.experiment import law_stream
 from pc_client.kinematics.clearance import clearance_model
-from pc_client.planning.joint_path import fixed_tcp_rotation
 from pc_client.planning.limits import limits_of
 from pc_client.recording.recording import load_recording
 from ur_emulator import ControlBox
@@ -314,23 +312,6 @@ def test_joint_angles_over_time_are_a_motion(arm):
     run = arm.run(ur.JointTrajectory(t, q))
     np.testing.assert_allclose(run.ref_q[-1], q[-1], atol=1e-9)
     np.testing.assert_allclose(run.q[-1], q[-1], atol=2e-3)
-
-
-def test_samples_with_orientations_turn_the_tool(arm):
-    t = np.linspace(0.0, 2.0, 200)
-    points = np.array(POINTS[0]) + np.outer(0.5 * (1.0 - np.cos(np.pi * t / 2.0)), [0.02, 0.1, 0.0])
-    turn = np.outer(np.sin(np.pi * t / 2.0) ** 2, [0.0, 0.0, 0.3])
-    wanted = Rotation.from_rotvec(turn) * Rotation.from_matrix(fixed_tcp_rotation())
-    by_vectors = ur.Movement.from_samples(t, points, wanted.as_rotvec())
-    by_quaternions = ur.Movement.from_samples(t, points, wanted.as_quat())
-    np.testing.assert_allclose(
-        ur.plan(by_quaternions, arm).joints.q, ur.plan(by_vectors, arm).joints.q, atol=1e-9
-    )
-    run = arm.run(by_vectors)
-    reached = Rotation.from_rotvec(run.tcp_pose[:, 3:])
-    turned = (reached * Rotation.from_matrix(fixed_tcp_rotation()).inv()).magnitude()
-    assert turned.max() == pytest.approx(0.3, abs=0.01)
-    assert turned[-1] < 0.01
 
 
 def test_a_plan_for_another_arm_or_cell_is_refused_before_it_moves(arm):
