@@ -1,4 +1,4 @@
-"""The table of builtins against the script manuals, the page that shows it, and how calls fit its rows.
+"""The table of builtins against the script manuals, and how calls fit its rows.
 
 The texts of wrong arguments are in `chunks/errors_of_arguments.script`.
 """
@@ -14,7 +14,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from docs.generate.coverage_page import render
 from urscript.builtins import pure_builtins
 from urscript.catalogue import ALL_ROWS, CB3_3_15, Builtin, Generation, TimeClass, catalogue_for
 from urscript.catalogue.calls import compile_fitting, fits, static_bind
@@ -191,19 +190,6 @@ def test_a_catalogue_of_the_tables_is_pickled_by_its_version_and_any_other_whole
     own = catalogue_for("5.11", rows=ALL_ROWS[:30])
     assert list(pickle.loads(pickle.dumps(own))) == list(own)
     assert len(own) < len(catalogue_for("5.11"))
-
-
-# --- the page
-
-
-@pytest.mark.parametrize(
-    ("version", "label"), [("3.15", "**total**"), *((v, f" {v} |") for v in ("3.15", "5.12", "10.11"))]
-)
-def test_totals_add_up(version, label):
-    line = next(line for line in render().splitlines() if line.startswith("| ") and label in line)
-    rows = catalogue_for(version)
-    counts = [*(sum(row.support is kind for row in rows) for kind in Support), len(rows)]
-    assert [int(cell) for cell in line.split("|")[2:6]] == counts
 
 
 # --- calls

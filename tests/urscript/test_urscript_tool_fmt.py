@@ -2,7 +2,7 @@ import re
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from lark import Lark
 from program_texts import print_program, programs, statements
@@ -61,7 +61,6 @@ gaps = st.one_of(
 )
 
 
-@settings(max_examples=30)
 @given(programs, st.data())
 def test_any_blanks_and_comments_between_tokens_leave_the_tree_and_the_comments_as_they_are(tree, data):
     canonical = print_program(tree)
@@ -176,7 +175,6 @@ def test_check_and_diff_write_nothing(folder):
     assert Path("ugly.script").read_bytes() == UGLY.encode()
 
 
-@settings(max_examples=30)
 @given(programs, statements)
 def test_same_tree_is_equality(tree, other):
     assert same_tree(tree, parse(Source(print_program(tree))))
