@@ -158,6 +158,11 @@ enter_critical exit_critical True False None ( ) [ ] : , = == != < > <= >= + - *
 WORDS = [*_WORDS.split(), "\n"]
 """For texts that are hardly ever programs."""
 
+numbers = st.one_of(
+    st.integers(-(2**31), 2**31 - 1),
+    st.floats(allow_nan=False, allow_infinity=False, width=32),
+    st.sampled_from([0, 1, -1, 0.0, 2**31 - 1, -(2**31)]),
+)
 variables = st.sampled_from(VARIABLES)
 names = variables.map(nodes.Name)
 texts = st.text(st.characters(max_codepoint=255, exclude_characters='"\n'), max_size=6)

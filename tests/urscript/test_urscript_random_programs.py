@@ -6,7 +6,16 @@ import pytest
 from chunk_runner import InterpretingHost
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from program_texts import WORDS, expressions, node_classes, print_expression, print_program, programs
+from program_texts import (
+    OPERATORS,
+    WORDS,
+    expressions,
+    node_classes,
+    numbers,
+    print_expression,
+    print_program,
+    programs,
+)
 
 from urscript.catalogue import CB3_3_15, catalogue_for
 from urscript.check.checking import check_program, check_with_advice
@@ -145,11 +154,8 @@ def _text(form, *parts):
 
 
 def _larger(e):
-    operator = st.sampled_from(
-        ["+", "-", "*", "/", "%", "==", "!=", "<", ">", "<=", ">=", "and", "or", "xor"]
-    )
     return st.one_of(
-        _text("({} {} {})", e, operator, e),
+        _text("({} {} {})", e, st.sampled_from(OPERATORS), e),
         _text("(not {})", e),
         _text("{}[{}]", st.sampled_from("cpmq"), e),
         _text("m[{}, {}]", e, e),
@@ -215,13 +221,6 @@ def test_a_random_program_ends_or_runs_on_and_leaves_no_thread(f, g, t, u, body,
 
 # --- operators ---------------------------------------------------------------------------------------------
 
-numbers = st.one_of(
-    st.integers(-(2**31), 2**31 - 1),
-    st.floats(allow_nan=False, allow_infinity=False, width=32),
-    st.sampled_from([0, 1, -1, 0.0, 2**31 - 1, -(2**31)]),
-)
-OPERATORS = ["+", "-", "*", "/", "%", "==", "!=", "<", "<=", ">", ">="]
-
 
 @given(numbers, numbers)
 def test_evident_types_and_unknown_types_compute_the_same(a, b):
@@ -229,7 +228,7 @@ def test_evident_types_and_unknown_types_compute_the_same(a, b):
     left, right = (f"({value!r})" for value in (a, b))
     text = ["def hidden(x):", "  return x", "end", "if False:", '  hidden("")', "end"]
     text += [f"x = {left}", f"y = {right}"]
-    for operator in OPERATORS:
+    for operator in OPERATORS[:11]:  # without those of conditions
         if b == 0 and operator in "/%":
             continue
         text += [
