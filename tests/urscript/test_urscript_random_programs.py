@@ -327,27 +327,19 @@ PLACES = st.sampled_from(["l", "s.l", "rows[1].l"])
 
 def apply(model, capacity, name, *arguments):
     """Do a call on the model; False where the language has an error."""
-    match name, *arguments:
-        case ("append", value):
-            model.append(value)
-        case ("extend", list(values)):
-            model.extend(values)
-        case ("insert", int(index), value):
-            if index > len(model):
-                return False
-            model.insert(index, value)
-        case ("pop",) if model:
-            model.pop()
-        case ("remove", int(index)) if index < len(model):
-            del model[index]
-        case ("clear",):
-            model.clear()
-        case ("store", int(index), value) if index < len(model):
-            model[index] = value
-        case ("assign", list(values)):
-            model[:] = values
-        case _:
+    if name in ("insert", "pop", "remove", "store"):
+        index = arguments[0] if arguments else 0
+        if index >= len(model) + (name == "insert"):
             return False
+    match name:
+        case "remove":
+            del model[arguments[0]]
+        case "store":
+            model[arguments[0]] = arguments[1]
+        case "assign":
+            model[:] = arguments[0]
+        case _:
+            getattr(model, name)(*arguments)
     return len(model) <= capacity
 
 
