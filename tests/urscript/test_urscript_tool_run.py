@@ -1,4 +1,4 @@
-"""`urscript run`: what it tells, how it ends, that it finds its robots; the lines that `--trace` shows."""
+"""What `urscript` tells; how `urscript run` ends, that it finds its robots."""
 
 import json
 import re
@@ -28,9 +28,9 @@ HOME = "[0, -1.5708, 0, -1.5708, 0, 0]"
 def run(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
-    def call(text, *words):
+    def call(text, *words, command="run"):
         Path("a.script").write_text(text, encoding="utf-8")
-        return CliRunner().invoke(app, ["run", *words, "a.script"])
+        return CliRunner().invoke(app, [command, *words, "a.script"])
 
     return call
 
@@ -39,23 +39,20 @@ def run(tmp_path, monkeypatch):
 
 
 def sessions():
-    """Options, program, exit code, standard output and error, of all programs of a file."""
-    text = Path(__file__).with_name("run_programs.script").read_text(encoding="utf-8")
+    """Command and options, program, exit code, standard output and error, of all programs of a file."""
+    text = Path(__file__).with_name("tool_sessions.script").read_text(encoding="utf-8")
     for part in re.split(r"^--- ", text, flags=re.MULTILINE)[1:]:
         head, _, rest = part.partition("\n")
         name, words = head.split(":")
-        said = {
-            mark: "".join(f"{line}\n" for line in re.findall(rf"^#{mark} (.*)$", rest, re.M))
-            for mark in ("out", "err")
-        }
+        out, err = ("".join(re.findall(rf"^#{mark} (.*\n)", rest, re.M)) for mark in ("out", "err"))
         code = int(next(iter(re.findall(r"^#exit (\d+)$", rest, re.M)), 0))
         program = re.sub(r"^#(out|err|exit) .*\n", "", rest, flags=re.M)
-        yield pytest.param(words.split(), program, code, said["out"], said["err"], id=name)
+        yield pytest.param(words.split(), program, code, out, err, id=name)
 
 
 @pytest.mark.parametrize(("words", "text", "code", "out", "err"), list(sessions()))
-def test_what_a_run_tells(run, words, text, code, out, err):
-    result = run(text, *words)
+def test_what_a_command_tells(run, words, text, code, out, err):
+    result = run(text, *words[1:], command=words[0])
     assert result.exit_code == code
     assert matches(out.replace("...\n", "..."), result.stdout), result.stdout
     assert matches(err.replace("...\n", "..."), result.stderr), result.stderr
@@ -104,15 +101,22 @@ def test_the_same_seed_is_the_same_run(run):
     assert told("--seed", "1") != told("--seed", "2")
 
 
+def started(tmp_path, text, *words):
+    (tmp_path / "a.script").write_text(text)
+    words = [
+        sys.executable,
+        "-c",
+        "from urscript.cli import main; main()",
+        "run",
+        *words,
+        str(tmp_path / "a.script"),
+    ]
+    return subprocess.Popen(words, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
 def test_ctrl_c_ends_it_with_a_line_and_without_a_traceback(tmp_path):
-    (tmp_path / "a.script").write_text(
-        'textmsg("on")\nwhile True:\n  speedj([0,0,0,0,0,0.1], 1, 0.1)\n  speedj([0,0,0,0,0,-0.1], 1, 0.1)\nend\n'
-    )
-    start = [sys.executable, "-c", "from urscript.cli import main; main()"]
-    words = ["run", "--limit", "1e9", str(tmp_path / "a.script")]
-    with subprocess.Popen(
-        [*start, *words], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as process:
+    loop = "while True:\n  speedj([0,0,0,0,0,0.1], 1, 0.1)\n  speedj([0,0,0,0,0,-0.1], 1, 0.1)\nend\n"
+    with started(tmp_path, f'textmsg("on")\n{loop}', "--limit", "1e9") as process:
         assert process.stdout.readline() == "on\n"
         process.send_signal(signal.SIGINT)
         output, error = process.communicate(timeout=60)
@@ -120,6 +124,16 @@ def test_ctrl_c_ends_it_with_a_line_and_without_a_traceback(tmp_path):
     assert re.match(r"interrupted after [\d.]+ s of robot time", error)
     assert error.count("\n") == 1
     assert "\njoints [" in f"\n{output}"
+
+
+def test_run_ends_quietly_when_nobody_reads_on(tmp_path):
+    # Far more than a pipe holds: it cannot end before its reader does.
+    words = ["--robot", "none", "--trace", "--trace-lines", "100000"]
+    with started(tmp_path, "while True:\n  sync()\nend\n", *words) as process:
+        assert "while True:" in process.stdout.readline()
+        process.stdout.close()
+        assert process.stderr.read() == ""
+    assert process.returncode == 1
 
 
 # --- the outside -----------------------------------------------------------------------------------------
@@ -204,30 +218,8 @@ def test_without_a_robot_it_only_writes_down(run, monkeypatch):
 # --- --trace
 
 
-def traced(run, text, *words):
-    result = run(text, "--robot", "none", "--quiet", "--trace", *words)
-    shown = [
-        re.fullmatch(r" *(\d+)  (\w+):(\d+): (.*)", line).groups() for line in result.stdout.splitlines()
-    ]
-    return [(int(cycle), thread, int(line), text) for cycle, thread, line, text in shown], result.stderr
-
-
 @pytest.mark.parametrize("text", ["halt", "x = [1]\ny = x[1]", "while True:\nend"])
 def test_the_tracing_of_others_is_as_before_whatever_happens(run, text):
     before = sys.gettrace()
     run(text, "--robot", "none", "--trace", "--trace-lines", "5")
     assert sys.gettrace() is before
-
-
-def test_run_ends_quietly_when_nobody_reads_on(tmp_path):
-    (tmp_path / "a.script").write_text("while True:\n  sync()\nend\n")
-    start = [sys.executable, "-c", "from urscript.cli import main; main()"]
-    # Far more than a pipe holds: it cannot end before its reader does.
-    words = ["run", "--robot", "none", "--trace", "--trace-lines", "100000", str(tmp_path / "a.script")]
-    with subprocess.Popen(
-        [*start, *words], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as process:
-        assert "while True:" in process.stdout.readline()
-        process.stdout.close()
-        assert process.stderr.read() == ""
-    assert process.returncode == 1
