@@ -99,14 +99,10 @@ LAYOUTS = {
     "only a comment": ("\n  # x  ", "# x\n"),
     "carriage returns": ("a = 1\r\n# c\r\nb = 2\r\n", "a = 1\n# c\nb = 2\n"),
     "labels": ('if x:\n$   2  "Move"  \nend', 'if x:\n  $ 2  "Move"\nend\n'),
-    "a byte that looks like a blank": ('$ 1 "Ã\xa0\n# Ã\xa0\n', '$ 1 "Ã\xa0\n# Ã\xa0\n'),
+    "a byte that looks like a blank": 2 * ('$ 1 "\xc3\xa0\n# \xc3\xa0\n',),
 }
-
-
-for part in re.split(r"^--- ", Path(__file__).with_name("layouts.script").read_text(), flags=re.MULTILINE)[
-    1:
-]:
-    name, _, both = part.partition("\n")
+_FILE = Path(__file__).with_name("layouts.script").read_text(encoding="utf-8")
+for name, _, both in (part.partition("\n") for part in re.split(r"^--- ", _FILE, flags=re.MULTILINE)[1:]):
     LAYOUTS[name] = both.split(">>>\n")
 
 
