@@ -161,8 +161,9 @@ def _expectations(chunk: Chunk) -> Chunk:
         if mark is None:
             continue
         kind, rest = mark[1], mark[2] or ""
-        if kind == ">":
-            chunk.messages.append(rest)
+        lists = {">": chunk.messages, "ref": chunk.rows, "interpret": chunk.lines, "discard": chunk.discarded}
+        if kind in lists:
+            lists[kind].append(rest)
         elif kind == "!":
             place = re.match(r"(\d+):(\d+) (.+)", rest)
             assert place, f"{chunk}: write '#! line:column text', not {line!r}"
@@ -171,14 +172,8 @@ def _expectations(chunk: Chunk) -> Chunk:
             chunk.wire_text = rest
         elif kind == "log":
             chunk.log_text = rest
-        elif kind == "ref":
-            chunk.rows.append(rest)
         elif kind == "@":
             chunk.calls = rest.split()
-        elif kind == "interpret":
-            chunk.lines.append(rest)
-        elif kind == "discard":
-            chunk.discarded.append(rest)
         elif kind == "<":
             chunk.frames = [*(chunk.frames or []), [int(word) for word in rest.split()]]
         else:

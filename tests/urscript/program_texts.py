@@ -8,8 +8,8 @@ grammar can put it.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from typing import Final
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any, Final
 
 from hypothesis import strategies as st
 
@@ -67,82 +67,34 @@ def _statement(statement: Statement, indent: str) -> Iterator[str]:
             yield from _block(body, deeper)
             yield f"{indent}end"
         case _:
-            yield indent + _short_statement(statement)
-
-
-def _short_statement(statement: Statement) -> str:
-    """A statement of one line."""
-    match statement:
-        case nodes.Assign(target=target, value=value, scope=scope):
-            lead = f"{scope} " if scope else ""
-            return f"{lead}{_expression(target, 0)} = {_expression(value, 0)}"
-        case nodes.Declaration(name=name, scope=scope):
-            return f"{scope} {name}"
-        case nodes.ExpressionStatement(value=value):
-            return _expression(value, 0)
-        case nodes.Return(value=value):
-            return "return" if value is None else f"return {_expression(value, 0)}"
-        case nodes.Join(thread=thread):
-            return f"join {_expression(thread, 0)}"
-        case nodes.Kill(thread=thread):
-            return f"kill {_expression(thread, 0)}"
-        case nodes.KeywordStatement(keyword=word):
-            return word
-        case nodes.Label(text=text):
-            return f"$ {text}" if text else "$"
-    raise TypeError(f"not a statement: {statement!r}")
+            yield indent + _FORMS[type(statement)](statement)
 
 
 def _parameter(parameter: nodes.Parameter) -> str:
-    if parameter.default is None:
-        return parameter.name
-    return f"{parameter.name}={_expression(parameter.default, 0)}"
+    default = "" if parameter.default is None else f"={print_expression(parameter.default)}"
+    return f"{parameter.name}{default}"
 
 
 def _expression(expression: Expression, level: int) -> str:
     """The text of `expression` where nothing that binds looser than `level` may stand without brackets."""
-    text, own_level = _bare(expression)
-    return f"({text})" if own_level < level else text
+    text = _FORMS[type(expression)](expression)
+    return f"({text})" if _level(expression) < level else text
 
 
-def _bare(expression: Expression) -> tuple[str, int]:
+def _level(expression: Expression) -> int:
     match expression:
-        case nodes.NoneLiteral():
-            return "None", _POSTFIX
-        case nodes.BoolLiteral(value=truth):
-            return str(truth), _POSTFIX
-        case nodes.IntLiteral(value=number):
-            return str(number), _POSTFIX
-        case nodes.FloatLiteral(value=real, text=spelling):
-            return spelling or repr(real), _POSTFIX
-        case nodes.StringLiteral(value=string):
-            return f'"{string}"', _POSTFIX
-        case nodes.ListLiteral(items=items):
-            return f"[{_list(items)}]", _POSTFIX
-        case nodes.PoseLiteral(items=items):
-            return f"p[{_list(items)}]", _POSTFIX
-        case nodes.Name(name=name):
-            return name, _POSTFIX
-        case nodes.Call(function=function, arguments=arguments):
-            return f"{function}({_arguments(arguments)})", _POSTFIX
-        case nodes.MethodCall(target=target, method=method, arguments=arguments):
-            return f"{_target(target)}.{method}({_arguments(arguments)})", _POSTFIX
-        case nodes.Subscript(target=target, indices=indices):
-            return f"{_target(target)}[{_list(indices)}]", _POSTFIX
-        case nodes.Attribute(target=target, name=name):
-            return f"{_target(target)}.{name}", _POSTFIX
-        case nodes.RunThread(thread=thread):
-            return f"run {thread}()", _POSTFIX
-        case nodes.UnaryOperation(operator="not", operand=operand):
-            return f"not {_expression(operand, _LEVEL['not'])}", _LEVEL["not"]
-        case nodes.UnaryOperation(operator=operator, operand=operand):
-            return f"{operator}{_expression(operand, _UNARY)}", _UNARY
-        case nodes.BinaryOperation(operator=operator, left=left, right=right):
-            level = _LEVEL.get(operator, _LEVEL["compare"])
-            # Comparisons do not chain, so neither side of one may be another.
-            left_level = level + 1 if level == _LEVEL["compare"] else level
-            return f"{_expression(left, left_level)} {operator} {_expression(right, level + 1)}", level
-    raise TypeError(f"not an expression: {expression!r}")
+        case nodes.UnaryOperation(operator=operator):
+            return _LEVEL["not"] if operator == "not" else _UNARY
+        case nodes.BinaryOperation(operator=operator):
+            return _LEVEL.get(operator, _LEVEL["compare"])
+    return _POSTFIX
+
+
+def _binary(operation: nodes.BinaryOperation) -> str:
+    level = _level(operation)
+    # Comparisons do not chain, so neither side of one may be another.
+    left = _expression(operation.left, level + (level == _LEVEL["compare"]))
+    return f"{left} {operation.operator} {_expression(operation.right, level + 1)}"
 
 
 def _target(expression: Expression) -> str:
@@ -152,14 +104,43 @@ def _target(expression: Expression) -> str:
 
 
 def _list(items: Iterable[Expression]) -> str:
-    return ", ".join(_expression(item, 0) for item in items)
+    return ", ".join(map(print_expression, items))
 
 
 def _arguments(arguments: Iterable[nodes.Argument]) -> str:
     return ", ".join(
-        (f"{argument.name}=" if argument.name else "") + _expression(argument.value, 0)
-        for argument in arguments
+        f"{item.name}={print_expression(item.value)}" if item.name else print_expression(item.value)
+        for item in arguments
     )
+
+
+_FORMS: Final[dict[type, Callable[[Any], str]]] = {
+    nodes.NoneLiteral: lambda _: "None",
+    nodes.BoolLiteral: lambda it: str(it.value),
+    nodes.IntLiteral: lambda it: str(it.value),
+    nodes.FloatLiteral: lambda it: it.text or repr(it.value),
+    nodes.StringLiteral: lambda it: f'"{it.value}"',
+    nodes.ListLiteral: lambda it: f"[{_list(it.items)}]",
+    nodes.PoseLiteral: lambda it: f"p[{_list(it.items)}]",
+    nodes.Name: lambda it: it.name,
+    nodes.Call: lambda it: f"{it.function}({_arguments(it.arguments)})",
+    nodes.MethodCall: lambda it: f"{_target(it.target)}.{it.method}({_arguments(it.arguments)})",
+    nodes.Subscript: lambda it: f"{_target(it.target)}[{_list(it.indices)}]",
+    nodes.Attribute: lambda it: f"{_target(it.target)}.{it.name}",
+    nodes.RunThread: lambda it: f"run {it.thread}()",
+    nodes.UnaryOperation: lambda it: it.operator.replace("not", "not ") + _expression(it.operand, _level(it)),
+    nodes.BinaryOperation: _binary,
+    # statements of one line
+    nodes.Assign: lambda it: f"{it.scope or ''} {_list([it.target])} = {_list([it.value])}".lstrip(),
+    nodes.Declaration: lambda it: f"{it.scope} {it.name}",
+    nodes.ExpressionStatement: lambda it: print_expression(it.value),
+    nodes.Return: lambda it: "return" if it.value is None else f"return {print_expression(it.value)}",
+    nodes.Join: lambda it: f"join {print_expression(it.thread)}",
+    nodes.Kill: lambda it: f"kill {print_expression(it.thread)}",
+    nodes.KeywordStatement: lambda it: it.keyword,
+    nodes.Label: lambda it: f"$ {it.text}".rstrip(" "),
+}
+"""The text of each kind of node that stands on one line."""
 
 
 # --- random trees and words
@@ -177,6 +158,11 @@ enter_critical exit_critical True False None ( ) [ ] : , = == != < > <= >= + - *
 WORDS = [*_WORDS.split(), "\n"]
 """For texts that are hardly ever programs."""
 
+numbers = st.one_of(
+    st.integers(-(2**31), 2**31 - 1),
+    st.floats(allow_nan=False, allow_infinity=False, width=32),
+    st.sampled_from([0, 1, -1, 0.0, 2**31 - 1, -(2**31)]),
+)
 variables = st.sampled_from(VARIABLES)
 names = variables.map(nodes.Name)
 texts = st.text(st.characters(max_codepoint=255, exclude_characters='"\n'), max_size=6)

@@ -1,4 +1,4 @@
-"""`urscript run`: what it tells, how it ends, that it finds its robots; the lines that `--trace` shows."""
+"""What `urscript` tells; how `urscript run` ends, that it finds its robots."""
 
 import json
 import re
@@ -10,6 +10,7 @@ import threading
 from pathlib import Path
 
 import pytest
+from chunk_runner import matches
 from program_texts import program_of
 from typer.testing import CliRunner
 
@@ -27,14 +28,34 @@ HOME = "[0, -1.5708, 0, -1.5708, 0, 0]"
 def run(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
-    def call(text, *words):
+    def call(text, *words, command="run"):
         Path("a.script").write_text(text, encoding="utf-8")
-        return CliRunner().invoke(app, ["run", *words, "a.script"])
+        return CliRunner().invoke(app, [command, *words, "a.script"])
 
     return call
 
 
 # --- what it tells ---------------------------------------------------------------------------------------
+
+
+def sessions():
+    """Command and options, program, exit code, standard output and error, of all programs of a file."""
+    text = Path(__file__).with_name("tool_sessions.script").read_text(encoding="utf-8")
+    for part in re.split(r"^--- ", text, flags=re.MULTILINE)[1:]:
+        head, _, rest = part.partition("\n")
+        name, words = head.split(":")
+        out, err = ("".join(re.findall(rf"^#{mark} (.*\n)", rest, re.M)) for mark in ("out", "err"))
+        code = int(next(iter(re.findall(r"^#exit (\d+)$", rest, re.M)), 0))
+        program = re.sub(r"^#(out|err|exit) .*\n", "", rest, flags=re.M)
+        yield pytest.param(words.split(), program, code, out, err, id=name)
+
+
+@pytest.mark.parametrize(("words", "text", "code", "out", "err"), list(sessions()))
+def test_what_a_command_tells(run, words, text, code, out, err):
+    result = run(text, *words[1:], command=words[0])
+    assert result.exit_code == code
+    assert matches(out.replace("...\n", "..."), result.stdout), result.stdout
+    assert matches(err.replace("...\n", "..."), result.stderr), result.stderr
 
 
 def test_the_final_pose_is_that_of_the_last_move(run):
@@ -49,79 +70,7 @@ def test_the_final_pose_is_that_of_the_last_move(run):
     assert move["time"] + move["duration"] == pytest.approx(document["robot_time"])
 
 
-def test_a_stream_ends_where_the_program_stops_calling(run):
-    text = program_of(
-        "i = 0",
-        "while i < 4:",
-        "speedj([0, 0, 0, 0, 0, 0.1], 1, 0.008)",
-        "i = i + 1",
-        "end",
-        "sleep(0.4)",
-        "speedj([0, 0, 0, 0, 0, 0.1], 1, 0.008)",
-        "speedl([0, 0, 0.01, 0, 0, 0], 1, 0.008)",
-    )
-    events = json.loads(run(text, "--json").stdout)["events"]
-    assert [(event["name"], event["calls"]) for event in events] == [
-        ("speedj", 4),
-        ("speedj", 1),
-        ("speedl", 1),
-    ]
-    assert [event["duration"] for event in events] == [0.032, 0.008, 0.008]
-
-
-def test_threads_beside_the_moving_one_are_reported_in_between(run):
-    text = "def p():\n  thread t():\n    sleep(0.1)\n    textmsg(1)\n  end\n  run t()\n"
-    lines = run(f"{text}  movej({HOME})\n  textmsg(2)\nend\n").stdout.splitlines()
-    mover = run(f"{text.replace('textmsg(1)', f'movej({HOME})')}  sleep(5)\nend\n").stdout.splitlines()[0]
-    assert "s  line 4 (t): movej " in mover
-    assert [lines[0], lines[1][13:27], lines[2]] == ["1", "line 7: movej ", "2"]
-
-
-def test_popups_are_closed_and_questions_answered(run):
-    text = program_of(
-        'popup("mind", "Caution", True, blocking=True)',
-        'n = request_integer_from_primary_client("how many")',
-        'b = request_boolean_from_primary_client("sure")',
-        "textmsg(n + 1, b)",
-    )
-    result = run(text, "--answer", "41", "--answer", "yes")
-    assert result.exit_code == 0
-    assert "s  popup Caution: mind (closed)\n" in result.stdout
-    assert "s  question how many 41\n" in result.stdout
-    assert "42True\n" in result.stdout
-
-
-def test_a_question_that_nobody_answers_ends_the_run_with_its_place(run):
-    result = run(program_of('n = request_integer_from_primary_client("how many")'), "--answer", "no idea")
-    assert result.exit_code == 1
-    assert (
-        "a.script:2:7: Runtime error: the program asks for an integer: 'how many', but the answer is 'no idea' (--answer)\n"
-        '      n = request_integer_from_primary_client("how many")\n          ^\n'
-    ) in result.stderr
-
-
 # --- how it ends -----------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("move", "said"),
-    [
-        ("movel(p[1.4, -0.1, 0.2, 0, 3.14, 0])", "Robot: the target p[1.4, -0.1, 0.2, 0, 3.14, 0] is out of reach; C204"),
-        ("movej([0, -90, 0, 0, 0, 0])", "joint 1 cannot be at -90 rad"),
-        ("movej(p[1.4, -0.1, 0.2, 0, 3.14, 0])", "The robot cannot reach the requested pose"),
-    ],
-)  # fmt: skip
-def test_a_target_that_the_arm_cannot_reach_is_named(run, move, said):
-    result = run(program_of(move))
-    assert result.exit_code == 1
-    assert result.stderr.startswith("a.script:2:3: ")
-    assert said in result.stderr
-
-
-def test_an_endless_program_ends_at_the_limit_and_says_so(run):
-    result = run("while True:\n  sync()\nend\n", "--limit", "0.8")
-    assert result.exit_code == 0
-    assert "stopped: still running after 0.8 s of robot time (--limit)" in result.stderr
 
 
 def test_a_wrong_program_is_not_run(run):
@@ -132,19 +81,9 @@ def test_a_wrong_program_is_not_run(run):
     assert document["diagnostics"][0]["hint"] == "did you mean 'movej'?"
 
 
-def test_a_text_that_runs_nothing_is_warned_of(run):
-    definitions = "def a():\nend\ndef b():\nend\n"
-    result = run(definitions)
-    assert result.exit_code == 0
-    said = "a.script:1:5: Warning: nothing runs: the text only defines 'a' and 'b' (write a() at its end) [W121]\n"
-    assert result.stderr.startswith(said)
-    told = json.loads(run(definitions, "--json").stdout)["diagnostics"]
-    assert [(one["severity"], one["code"]) for one in told] == [("warning", "W121")]
-    for text in (f"{definitions}b()\n", "def a():\nend\n"):
-        assert "Warning" not in run(text).stderr
-
-
-def test_a_failure_is_a_diagnostic_for_editors(run):
+def test_a_warning_and_a_failure_are_diagnostics_for_editors(run):
+    (warning,) = json.loads(run("def a():\nend\ndef b():\nend\n", "--json").stdout)["diagnostics"]
+    assert (warning["severity"], warning["code"]) == ("warning", "W121")
     result = run(program_of("x = [1]", "i = 7", "textmsg(x[i])"), "--json")
     assert result.exit_code == 1
     found = json.loads(result.stdout)["diagnostics"]
@@ -162,15 +101,22 @@ def test_the_same_seed_is_the_same_run(run):
     assert told("--seed", "1") != told("--seed", "2")
 
 
+def started(tmp_path, text, *words):
+    (tmp_path / "a.script").write_text(text)
+    words = [
+        sys.executable,
+        "-c",
+        "from urscript.cli import main; main()",
+        "run",
+        *words,
+        str(tmp_path / "a.script"),
+    ]
+    return subprocess.Popen(words, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
 def test_ctrl_c_ends_it_with_a_line_and_without_a_traceback(tmp_path):
-    (tmp_path / "a.script").write_text(
-        'textmsg("on")\nwhile True:\n  speedj([0,0,0,0,0,0.1], 1, 0.1)\n  speedj([0,0,0,0,0,-0.1], 1, 0.1)\nend\n'
-    )
-    start = [sys.executable, "-c", "from urscript.cli import main; main()"]
-    words = ["run", "--limit", "1e9", str(tmp_path / "a.script")]
-    with subprocess.Popen(
-        [*start, *words], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as process:
+    loop = "while True:\n  speedj([0,0,0,0,0,0.1], 1, 0.1)\n  speedj([0,0,0,0,0,-0.1], 1, 0.1)\nend\n"
+    with started(tmp_path, f'textmsg("on")\n{loop}', "--limit", "1e9") as process:
         assert process.stdout.readline() == "on\n"
         process.send_signal(signal.SIGINT)
         output, error = process.communicate(timeout=60)
@@ -178,6 +124,16 @@ def test_ctrl_c_ends_it_with_a_line_and_without_a_traceback(tmp_path):
     assert re.match(r"interrupted after [\d.]+ s of robot time", error)
     assert error.count("\n") == 1
     assert "\njoints [" in f"\n{output}"
+
+
+def test_run_ends_quietly_when_nobody_reads_on(tmp_path):
+    # Far more than a pipe holds: it cannot end before its reader does.
+    words = ["--robot", "none", "--trace", "--trace-lines", "100000"]
+    with started(tmp_path, "while True:\n  sync()\nend\n", *words) as process:
+        assert "while True:" in process.stdout.readline()
+        process.stdout.close()
+        assert process.stderr.read() == ""
+    assert process.returncode == 1
 
 
 # --- the outside -----------------------------------------------------------------------------------------
@@ -232,11 +188,6 @@ def test_an_arm_is_chosen_by_its_name_its_file_or_its_software(run, words, title
     assert json.loads(run("textmsg(get_steptime())", *words, "--json").stdout)["robot"].startswith(title)
 
 
-def test_what_the_parser_takes_is_no_error_of_the_parser(run):
-    said = "a.script:1:29: Syntax error: positional argument after a named argument\n"
-    assert run("movej(q=[0, 0, 0, 0, 0, 0], 1.2)\n").stderr.startswith(said)
-
-
 @pytest.mark.parametrize(
     ("words", "allowed"),
     [
@@ -267,79 +218,8 @@ def test_without_a_robot_it_only_writes_down(run, monkeypatch):
 # --- --trace
 
 
-PROGRAM = """def p():
-  def f(x):
-    return x + 1
-  end
-  thread t():
-    while True:
-      sync()
-    end
-  end
-  h = run t()
-  # a comment
-  a = 1 b = f(a)
-  sync()
-  if a == b:
-    halt
-  elif a < b:
-    kill h
-  end
-end
-"""
-
-
-def traced(run, text, *words):
-    result = run(text, "--robot", "none", "--quiet", "--trace", *words)
-    shown = [
-        re.fullmatch(r" *(\d+)  (\w+):(\d+): (.*)", line).groups() for line in result.stdout.splitlines()
-    ]
-    return [(int(cycle), thread, int(line), text) for cycle, thread, line, text in shown], result.stderr
-
-
-def test_every_line_is_shown_once_before_it_is_executed_with_cycle_and_thread(run):
-    result = run(PROGRAM, "--robot", "none", "--quiet", "--trace")
-    assert [line.strip() for line in result.stdout.splitlines()] == [
-        "0  p:1: def p():",
-        "0  p:10: h = run t()",
-        "0  p:12: a = 1 b = f(a)",
-        "0  p:2: def f(x):",
-        "0  p:3: return x + 1",
-        "0  p:13: sync()",
-        "0  t:5: thread t():",
-        "0  t:6: while True:",
-        "0  t:7: sync()",
-        "1  p:14: if a == b:",
-        "1  p:16: elif a < b:",
-        "1  p:17: kill h",
-    ]
-    assert result.stderr == ""
-
-
 @pytest.mark.parametrize("text", ["halt", "x = [1]\ny = x[1]", "while True:\nend"])
 def test_the_tracing_of_others_is_as_before_whatever_happens(run, text):
     before = sys.gettrace()
     run(text, "--robot", "none", "--trace", "--trace-lines", "5")
     assert sys.gettrace() is before
-
-
-def test_run_trace_mixes_lines_and_effects_in_their_order(run):
-    result = run('textmsg("\u00e4")\nset_flag(0, True)\n', "--robot", "none", "--trace")
-    assert result.stdout == (
-        '     0  textmsg:1: textmsg("\u00e4")\n\u00e4\n'
-        "     0  textmsg:2: set_flag(0, True)\n    0.000 s  textmsg: set_flag(0, True)\n"
-    )
-
-
-def test_run_ends_quietly_when_nobody_reads_on(tmp_path):
-    (tmp_path / "a.script").write_text("while True:\n  sync()\nend\n")
-    start = [sys.executable, "-c", "from urscript.cli import main; main()"]
-    # Far more than a pipe holds: it cannot end before its reader does.
-    words = ["run", "--robot", "none", "--trace", "--trace-lines", "100000", str(tmp_path / "a.script")]
-    with subprocess.Popen(
-        [*start, *words], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as process:
-        assert "while True:" in process.stdout.readline()
-        process.stdout.close()
-        assert process.stderr.read() == ""
-    assert process.returncode == 1
