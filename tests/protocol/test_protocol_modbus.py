@@ -183,3 +183,23 @@ def test_any_answer_has_a_value_or_none(function, answer):
     values = decode_values(encode_read(function, 5, 3), answer)
     top = 1 if function.is_bits else 0xFFFF
     assert values is None or (len(values) == 3 and all(0 <= value <= top for value in values))
+
+
+@pytest.mark.parametrize(
+    ("function", "most"), [(F.READ_COILS, 2000), (F.READ_HOLDING_REGISTERS, 125), (F.WRITE_REGISTERS, 123)]
+)
+def test_a_request_has_so_many_addresses_at_most(function, most):
+    for count, is_taken in ((1, True), (most, True), (most + 1, False)):
+        is_read = function.is_read
+        pdu = encode_read(function, 0, count) if is_read else encode_write(function, 0, (1,) * count)
+        if is_taken:
+            assert decode_request(pdu).count == count
+        else:
+            with pytest.raises(ModbusRequestError, match="ILLEGAL_DATA_VALUE"):
+                decode_request(pdu)
+
+
+@pytest.mark.parametrize(("count", "size"), [(1, 1), (8, 1), (9, 2), (16, 2)])
+def test_eight_bits_are_a_byte(count, size):
+    request = decode_request(pdu := encode_write(F.WRITE_COILS, 0, (1,) * count))
+    assert (request.values, pdu[5], len(pdu)) == ((1,) * count, size, 6 + size)
