@@ -18,8 +18,9 @@ from pc_client.analysis import measures
 from pc_client.arrays import Array
 from pc_client.driver.velocity_stream import StreamReport
 from pc_client.errors import RecordingError
+from pc_client.recording.export import flat_columns, split_columns, table_of
 from pc_client.recording.provenance import Provenance, Source, origin_of
-from pc_client.recording.recording import Recording, flat_columns, load_recording, split_columns, table_of
+from pc_client.recording.recording import Recording, load_recording
 from pc_client.results import sheet
 from pc_client.results.sheet import Box, Curve, Panel, Sheet, boxes
 from protocol.ur_types import JOINT_NAMES

@@ -20,8 +20,9 @@ from recording_samples import N_VALUES, SIGNALS, append_rows, provenance
 from scipy.io import loadmat
 
 from pc_client.errors import RecordingError
+from pc_client.recording.export import export
 from pc_client.recording.recorder import ROWS_PER_CHUNK, Recorder
-from pc_client.recording.recording import Recording, export, load_recording
+from pc_client.recording.recording import Recording, load_recording
 from pc_client.recording.rows import Phase, parse_schema_text, row_topics, schema_text
 
 

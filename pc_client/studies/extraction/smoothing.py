@@ -71,16 +71,21 @@ def smooth_part(part: PenPart) -> Trace:
     return Trace(read_only(t), read_only(p), read_only(velocity(t, p)))
 
 
+def unfiltered(part: PenPart, t: Array) -> Trace:
+    """The signal of a part that moves at the times t, (n,), s, without the low-pass."""
+    p = _interpolated(part, t)
+    return Trace(t, p, velocity(t, p))
+
+
 def speed_peaks(part: Trace) -> NDArray[np.intp]:
     """Indices of the local maxima of the speed inside a part, (n_peaks,).
 
     All of them count that rise by more than `_PROMINENCE` of the part's top speed above the higher of the two
     valleys beside them. The first and the last sample are no maxima, however high.
     """
-    speed = part.speed
-    peaks, _ = find_peaks(speed, prominence=_PROMINENCE * float(speed.max()))
-    found: NDArray[np.intp] = peaks
-    return found
+    peaks: NDArray[np.intp]
+    peaks, _ = find_peaks(part.speed, prominence=_PROMINENCE * float(part.speed.max()))
+    return peaks
 
 
 def _interpolated(part: PenPart, t: Array) -> Array:
