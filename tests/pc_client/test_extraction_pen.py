@@ -17,7 +17,7 @@ from pc_client.studies.extraction.pen import (
     ordered_part,
     parse_pen,
     pen_sources,
-    read_pen,
+    read_recording,
 )
 
 OMNIGLOT = "START\n10.5,-20.25,0\n11.5,-21.25,9\n12.5,-22.25,20\nBREAK\n30,-40,400\n31,-40,410\nBREAK\n"
@@ -169,7 +169,7 @@ def test_what_makes_no_sense_is_one_line_with_the_file_and_the_place(content, wo
 
 def test_a_missing_file(tmp_path):
     with pytest.raises(RecordingError, match=r"nothing\.csv: cannot be read \(No such file"):
-        read_pen(tmp_path / "nothing.csv")
+        read_recording(tmp_path / "nothing.csv")
 
 
 def test_parts_are_checked_when_they_are_made():

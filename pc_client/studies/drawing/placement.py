@@ -63,33 +63,37 @@ class Mark:
         trajectory = None if self.trajectory is None else self.trajectory.transformed(similarity)
         return Mark(self.begin, self.end, read_only(first), read_only(last), trajectory)
 
-    def length_before(self, lead: float) -> float:
-        """Path length that the strokes have done `lead` s before the pen comes down."""
-        return self._length(self.begin - lead, done=True)
-
-    def length_after(self, lag: float) -> float:
-        """Path length that the strokes have still to do `lag` s after the pen went up."""
-        return self._length(self.end + lag, done=False)
+    def length_outside(self, time: float, *, before: bool) -> float:
+        """Path length that is done `time` s before the pen comes down, or still to do so long after it went up."""
+        if self.trajectory is None:
+            return 0.0
+        t = self.begin - time if before else self.end + time
+        shares = (float(stroke.timing.lognormal.evaluate(t).done) for stroke in self.trajectory.strokes)
+        return math.fsum(
+            length * (share if before else 1.0 - share)
+            for length, share in zip(self.trajectory.lengths.tolist(), shares, strict=True)
+        )
 
     def lead(self, tolerance: float) -> float:
         """How long (s) before the pen comes down the strokes have done no more than a path length."""
-        if self.trajectory is None or self.length_before(0.0) <= tolerance:
-            return 0.0
-        begin = min(s.timing.lognormal.time_at_deviation(-_OVER) for s in self.trajectory.strokes)
-        most = self.begin - begin
-        if self.length_before(most) > tolerance:
-            return most
-        return float(bisect(lambda u: self.length_before(u) - tolerance, 0.0, most, xtol=_TIME_ACCURACY))
+        return self._tail(tolerance, before=True)
 
     def lag(self, tolerance: float) -> float:
-        """How long (s) after the pen went up the strokes have still to do more than a path length."""
-        if self.trajectory is None or self.length_after(0.0) <= tolerance:
+        """How long (s) after the pen went up the strokes have no more than a path length to do."""
+        return self._tail(tolerance, before=False)
+
+    def _tail(self, tolerance: float, *, before: bool) -> float:
+        def too_much(time: float) -> float:
+            return self.length_outside(time, before=before) - tolerance
+
+        if self.trajectory is None or too_much(0.0) <= 0.0:
             return 0.0
-        end = max(s.timing.lognormal.time_at_deviation(_OVER) for s in self.trajectory.strokes)
-        most = end - self.end
-        if self.length_after(most) > tolerance:
-            return most
-        return float(bisect(lambda u: self.length_after(u) - tolerance, 0.0, most, xtol=_TIME_ACCURACY))
+        lognormals = [stroke.timing.lognormal for stroke in self.trajectory.strokes]
+        if before:
+            most = self.begin - min(lognormal.time_at_deviation(-_OVER) for lognormal in lognormals)
+        else:
+            most = max(lognormal.time_at_deviation(_OVER) for lognormal in lognormals) - self.end
+        return most if too_much(most) > 0.0 else float(bisect(too_much, 0.0, most, xtol=_TIME_ACCURACY))
 
     def path(self, tolerance: float, n: int = 801) -> Array:
         """The whole path of the strokes, up to a path length at both ends, and its end points; (m, 3)."""
@@ -98,15 +102,6 @@ class Mark:
             return ends
         t = np.linspace(self.begin - self.lead(tolerance), self.end + self.lag(tolerance), n)
         return np.vstack((ends, self.trajectory.evaluate(t).p))
-
-    def _length(self, t: float, *, done: bool) -> float:
-        if self.trajectory is None:
-            return 0.0
-        shares = [float(stroke.timing.lognormal.evaluate(t).done) for stroke in self.trajectory.strokes]
-        return math.fsum(
-            length * (share if done else 1.0 - share)
-            for length, share in zip(self.trajectory.lengths.tolist(), shares, strict=True)
-        )
 
 
 def marks_of(extraction: Extraction) -> tuple[Mark, ...]:

@@ -140,7 +140,7 @@ def extract_many(
         ClientError: the executor broke down.
     """
     outcomes: dict[int, ExtractionOutcome] = {}
-    running: dict[Future[ExtractionOutcome], tuple[int, str, int]] = {}  # index, name, bytes
+    running: dict[Future[ExtractionOutcome], tuple[int, int]] = {}  # index, bytes
 
     def keep(index: int, outcome: ExtractionOutcome) -> None:
         outcomes[index] = outcome
@@ -148,20 +148,20 @@ def extract_many(
 
     def wait_for_some() -> None:
         for future in wait(running, return_when=FIRST_COMPLETED).done:
-            index, name, _ = running.pop(future)
-            keep(index, _result(future, name))
+            index, _ = running.pop(future)
+            keep(index, _result(future, sources[index].name))
 
     for index, (source, content) in enumerate(contents(sources)):
         if isinstance(content, RecordingError):
             keep(index, ExtractionOutcome(source.name, error=str(content)))
             continue
         arguments = (source.name, content, options or ExtractOptions(), time_unit, index < n_pictures)
-        running[executor.submit(_extract_one, *arguments)] = (index, source.name, len(content))
-        while len(running) >= _IN_FLIGHT or sum(n for _, _, n in running.values()) > _BYTES_IN_FLIGHT:
+        running[executor.submit(_extract_one, *arguments)] = (index, len(content))
+        while len(running) >= _IN_FLIGHT or sum(n for _, n in running.values()) > _BYTES_IN_FLIGHT:
             wait_for_some()
     while running:
         wait_for_some()
-    return [outcomes[index] for index in sorted(outcomes)]
+    return [outcomes[index] for index in range(len(sources))]
 
 
 def _extract_one(

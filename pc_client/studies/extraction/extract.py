@@ -9,7 +9,8 @@ The figures, over all parts of a recording that move, against the recording low-
     SNR_t        10 log10( sum |p - mean p|^2 / sum |p - p_hat|^2 ), mean p of each part by itself
     lognormality SNR_v / number of strokes
 
-The raw SNR_v and SNR_t are the same against the recording at the same times before the low-pass.
+The raw SNR_v and SNR_t are against the samples of the recording as they are: SNR_t at their times, SNR_v on
+the mean velocities between them, each weighted by the time between them.
 
 A signal so clean that the strokes could be fitted through the low-pass is judged through it, too: the filter
 flattens fast speed profiles in the recording, too.
@@ -31,8 +32,12 @@ from pc_client.studies.extraction.chain import Bounds, Chain, sigma_lognormal
 from pc_client.studies.extraction.fitting import FitOptions, fit_parts, left_over
 from pc_client.studies.extraction.pen import PenPart, PenRecording
 from pc_client.studies.extraction.refine import residuals
-from pc_client.studies.extraction.smoothing import moves, smooth_part, speed_peaks, unfiltered
+from pc_client.studies.extraction.smoothing import moves, smooth_part, speed_peaks
 from pc_client.studies.signals import Trace, decibels
+
+
+#: Samples that are nearer count as this far from each other, s: no hand moves in less.
+_SHORTEST_STEP_S = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +91,7 @@ class Extraction:
     Attributes:
         parts: those that move, in order of time.
         snr_v_db: over all parts, or None when nothing moves; so the next three.
-        raw_snr_v_db: against the recording before the low-pass; so the next.
+        raw_snr_v_db: against the samples before the low-pass; so the next.
         remarks: what was mended in the recording, and what to know about the strokes.
         still: parts without a movement: dots and touches. They have no strokes.
     """
@@ -139,8 +144,7 @@ def extract(recording: PenRecording, options: ExtractOptions | None = None) -> E
     parts, powers, raw_powers = [], [], []
     for pen, part, chain, count in zip(moving, smooth, fitted.chains, n_peaks, strict=True):
         powers.append(_powers(part, *left_over(chain, part, through=fitted.through)))
-        raw = unfiltered(pen, part.t)
-        raw_powers.append(_powers(raw, *residuals(chain, raw)))
+        raw_powers.append(_raw_powers(pen, chain))
         trajectory = sigma_lognormal(chain, float(part.t[-1]))
         parts.append(PartExtraction(part.t, part.p, part.v, trajectory, *_ratios(powers[-1]), count))
     ratios = (*_ratios(np.sum(powers, axis=0)), *_ratios(np.sum(raw_powers, axis=0)))
@@ -151,6 +155,15 @@ def _powers(signal: Trace, p_left: Array, v_left: Array) -> Array:
     """Of velocity and its error, of position and its error."""
     moved = signal.p - signal.p.mean(axis=0)
     return np.array([np.sum(values**2) for values in (signal.v, v_left, moved, p_left)])
+
+
+def _raw_powers(part: PenPart, chain: Chain) -> Array:
+    """The same for the samples as they are."""
+    still = np.zeros_like(part.p)
+    p_left, _ = residuals(chain, Trace(part.t, part.p, still))
+    root_steps = np.sqrt(np.diff(part.t).clip(_SHORTEST_STEP_S))[:, None]
+    v, v_left = (np.diff(p, axis=0) / root_steps for p in (part.p, p_left))
+    return _powers(Trace(part.t, part.p, v), p_left, v_left)
 
 
 def _ratios(powers: Array) -> tuple[float, float]:

@@ -71,12 +71,6 @@ def smooth_part(part: PenPart) -> Trace:
     return Trace(read_only(t), read_only(p), read_only(velocity(t, p)))
 
 
-def unfiltered(part: PenPart, t: Array) -> Trace:
-    """The signal of a part that moves at the times t, (n,), s, without the low-pass."""
-    p = _interpolated(part, t)
-    return Trace(t, p, velocity(t, p))
-
-
 def speed_peaks(part: Trace) -> NDArray[np.intp]:
     """Indices of the local maxima of the speed inside a part, (n_peaks,).
 
