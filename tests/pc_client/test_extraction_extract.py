@@ -37,7 +37,9 @@ def check_own(result, trajectory):
     assert numbers(result.parts[0].trajectory) == pytest.approx(numbers(trajectory), abs=1e-3)
 
 
-@pytest.mark.parametrize(("seed", "dim", "rate"), [(0, 2, 200.0), (1, 3, 200.0), (4, 2, 60.0), (4, 2, 1000.0)])
+@pytest.mark.parametrize(
+    ("seed", "dim", "rate"), [(0, 2, 200.0), (1, 3, 200.0), (4, 2, 60.0), (4, 2, 1000.0)]
+)
 def test_own_strokes_come_back_at_any_rate(seed, dim, rate):
     trajectory = own_strokes(seed, dim)
     result = extract(recorded(trajectory, dim, rate=rate))
@@ -207,7 +209,12 @@ def test_parts_share_a_time_axis_and_a_budget():
 
 @pytest.mark.parametrize(
     ("t", "p"),
-    [([], None), ([0.0], [[1.0, 2.0]]), ([0.0, 0.2], [[1.0, 2.0]] * 2), ([0.0, 0.01], [[1.0, 2.0], [1.0, 3.0]])],
+    [
+        ([], None),
+        ([0.0], [[1.0, 2.0]]),
+        ([0.0, 0.2], [[1.0, 2.0]] * 2),
+        ([0.0, 0.01], [[1.0, 2.0], [1.0, 3.0]]),
+    ],
     ids=["nothing", "a sample", "a dot", "a touch"],
 )
 def test_where_nothing_moves_there_is_no_stroke_and_no_snr(t, p):

@@ -64,7 +64,7 @@ class Mark:
         return Mark(self.begin, self.end, read_only(first), read_only(last), trajectory)
 
     def length_outside(self, time: float, *, before: bool) -> float:
-        """Path length that is done `time` s before the pen comes down, or still to do so long after it went up."""
+        """Path length done `time` s before the pen comes down, or still to do `time` s after it went up."""
         if self.trajectory is None:
             return 0.0
         t = self.begin - time if before else self.end + time

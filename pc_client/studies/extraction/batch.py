@@ -35,12 +35,21 @@ Row = Mapping[str, Any]
 
 _FIGURES = (
     Column("file", align="left", kind=str),
-    Column("snr_v_db", "SNR_v", "dB", ".2f", missing="-", text="missing: nothing moves"),
-    Column("snr_t_db", "SNR_t", "dB", ".2f", missing="-", text="likewise"),
-    Column("raw_snr_v_db", "raw SNR_v", "dB", ".2f", missing="-", text="against the recording not low-passed"),
-    Column("raw_snr_t_db", "raw SNR_t", "dB", ".2f", missing="-", text="likewise"),
+    Column("snr_v_db", "SNR_v", "dB", ".2f", "right", "-", text="missing: nothing moves"),
+    Column("snr_t_db", "SNR_t", "dB", ".2f", "right", "-", text="likewise"),
+    Column(
+        "raw_snr_v_db",
+        "raw SNR_v",
+        "dB",
+        ".2f",
+        "right",
+        "-",
+        "raw\nSNR_v",
+        text="of the samples as they are",
+    ),
+    Column("raw_snr_t_db", "raw SNR_t", "dB", ".2f", "right", "-", "raw\nSNR_t", text="likewise"),
     Column("n_strokes", "strokes", kind=int),
-    Column("n_speed_peaks", "speed peaks", kind=int),
+    Column("n_speed_peaks", "speed peaks", narrow="speed\npeaks", kind=int),
 )
 """The keys of extraction.json."""
 

@@ -35,7 +35,6 @@ from pc_client.studies.extraction.refine import residuals
 from pc_client.studies.extraction.smoothing import moves, smooth_part, speed_peaks
 from pc_client.studies.signals import Trace, decibels
 
-
 #: Samples that are nearer count as this far from each other, s: no hand moves in less.
 _SHORTEST_STEP_S = 1e-6
 
