@@ -239,7 +239,7 @@ def test_a_small_drawing_is_as_fast_as_the_hand_times_what_is_asked():
     drawing = make_drawing(one_part(), "small", ARM, options, slower=1.5)
     assert drawing.factor == 1.5
     assert drawing.movement.duration == pytest.approx(1.5 * drawing.joined.trajectory.duration)
-    with pytest.raises(MovementError, match="0.9 times slower"):
+    with pytest.raises(MovementError, match=r"0\.9 times slower"):
         make_drawing(one_part(), "small", ARM, options, slower=0.9)
 
 

@@ -236,11 +236,9 @@ def test_short_parts_have_a_stroke(n, duration, dim):
 
 
 @pytest.mark.parametrize("dim", [2, 3])
-@pytest.mark.parametrize("x", [[0, 1, 0], [0, 0, 0, 1e-4, 0, 0, 0]])
-def test_there_and_back_again_has_a_stroke_with_a_chord(x, dim):
-    t = np.linspace(0.0, 0.1 * len(x), len(x))
-    p = np.zeros((len(x), dim))
-    p[:, 0] = x
+def test_there_and_back_again_has_a_stroke_with_a_chord(dim):
+    t = np.linspace(0.0, 0.3, 3)
+    p = np.eye(3, dim)[[1, 0, 1]]
     result = extract(PenRecording("back", (PenPart(t, p),)))
     assert result.n_strokes >= 1
     assert math.isfinite(result.snr_v_db)
@@ -268,15 +266,6 @@ def test_no_samples_whatever_make_it_fail(rows, unit):
         ratios = (result.snr_v_db, result.snr_t_db, result.raw_snr_v_db, result.raw_snr_t_db)
         assert all(map(math.isfinite, ratios))
         assert all(np.isfinite(part.trajectory.evaluate(part.t).p).all() for part in result.parts)
-
-
-def test_a_long_recording_costs_memory_in_proportion_to_its_length():
-    """A minute of movement: the equations are a band, never a square."""
-    trajectory = own_strokes(7, 2, n=60, stroke_time=1.5, overlap=0.4)
-    options = ExtractOptions(fit=FitOptions(rounds=1, iterations=3, last_iterations=4))
-    result = extract(recorded(trajectory, 2), options)
-    assert result.parts[0].t[-1] > 50.0
-    assert result.snr_v_db > 30.0
 
 
 @pytest.mark.parametrize("dim", [2, 3])

@@ -240,21 +240,16 @@ def test_a_frame_without_sense_is_recorded_as_it_is(tmp_path: Path, name: str, v
 
 
 @pytest.mark.skipif(not RERUN.exists(), reason="needs rerun-sdk, 500 MB: pip install rerun-sdk")
-def test_rerun_shows_the_arm_without_any_setting(recording: Path, tmp_path: Path) -> None:
-    """Bodies of all links, each in the frame that `/tf` moves."""
-
+def test_rerun_shows_bodies_of_all_links_in_the_frames_that_tf_moves(recording: Path, tmp_path: Path) -> None:
     def rerun(*arguments: object) -> str:
-        return subprocess.run(
-            [RERUN, *map(str, arguments)], check=True, capture_output=True, text=True
-        ).stdout
+        words = [RERUN, *map(str, arguments)]
+        return subprocess.run(words, check=True, capture_output=True, text=True).stdout
 
     assert rerun("mcap", "check", recording).count("ok ") == 9
-    shown = tmp_path / "a.rrd"
-    rerun("mcap", "convert", recording, "-o", shown)
-    listed = rerun("rrd", "print", shown)
-    links = ElementTree.fromstring(arm_tree(ROBOTS["ur3"]).urdf).findall("link")
-    for link in links:
+    rerun("mcap", "convert", recording, "-o", tmp_path / "shown.rrd")
+    listed = rerun("rrd", "print", tmp_path / "shown.rrd").splitlines()
+    for link in ElementTree.fromstring(arm_tree(ROBOTS["ur3"]).urdf).findall("link"):
         for number in range(len(link.findall("visual"))):
             body = f"/ur3/visual_geometries/{link.get('name')}/visual_{number} "
-            assert any("Cylinders3D" in line for line in listed.splitlines() if body in line)
-    assert any(" /tf " in line and "Transform3D:quaternion" in line for line in listed.splitlines())
+            assert any("Cylinders3D" in line for line in listed if body in line)
+    assert any(" /tf " in line and "Transform3D:quaternion" in line for line in listed)
