@@ -2,13 +2,8 @@
 
 The strokes of a recording are extracted, placed in the workspace, joined with lifts between them, and slowed
 down as far as the arm needs it. Strokes of marks and of lifts add up alike, so all stand in one chain of
-target points:
-
-    lowered pen   one stroke from above the start of the first mark
-    mark 1        its own strokes
-    pen-up move   two strokes over a via point above the sheet, to the start of mark 2, overlapping in time
-    mark 2 ...
-    lifted pen    one stroke to above the end of the last mark
+target points: one stroke lowers the pen, each mark has its own strokes, a pen-up move between two marks has
+two that overlap in time, over a via point above the sheet, and one stroke lifts the pen at the end.
 
 Each mark keeps its strokes, shape and timing. Only the gaps between marks may become longer: where a tail
 of a mark's strokes would reach into its neighbour, or where a pen-up move needs more time. Strokes of lifts

@@ -72,13 +72,10 @@ class Entry:
 
 def table_of(verdict: Verdict) -> pl.DataFrame:
     """A row for each signal of one drawing, with `COLUMNS`."""
+    strokes = {**_agreement(human=verdict.reconstruction), **asdict(verdict.reconstructed)}
     rows = [
         {"signal": "human", **asdict(verdict.human)},
-        {
-            "signal": "reconstructed",
-            **_agreement(human=verdict.reconstruction),
-            **asdict(verdict.reconstructed),
-        },
+        {"signal": "reconstructed", **strokes},
         {"signal": "planned", **_agreement(human=verdict.plan)},
     ]
     for run in verdict.runs:

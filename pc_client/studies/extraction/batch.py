@@ -6,7 +6,6 @@
 Files are read here and their bytes handed to the jobs, so a worker on another machine needs no disk of ours.
 A recording that cannot be used has an outcome that says so; it does not stop the others.
 
-`extraction.json` is a list of rows, one for each recording that could be read, in the order they were given.
 `strokes.csv` holds every stroke as the theory writes it, so that the movement can be rebuilt from it alone.
 A stroke runs from (x0, y0, z0) to (x1, y1, z1), in the unit of the recording, turning by `arc_angle` [rad] in
 the plane that `tilt` [rad] chooses (see `sigma_lognormal.arc_frame`); length is D, t0 is in s. Parts and

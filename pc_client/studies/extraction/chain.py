@@ -87,8 +87,8 @@ class Chain:
 
     def picked(self, which: NDArray[np.bool_ | np.intp], targets: Array) -> Chain:
         """Some of the strokes, or all in another order, from target to target of these."""
-        of_strokes = (self.median, self.width, self.sigma, self.arc_angle, self.normal)
-        return Chain(*(values[which] for values in of_strokes), targets)
+        names = ("median", "width", "sigma", "arc_angle", "normal")
+        return replace(self, targets=targets, **{name: getattr(self, name)[which] for name in names})
 
     def time_at_deviation(self, z: float) -> Array:
         """Times (s,) at which each stroke has done Phi(z) of its length."""

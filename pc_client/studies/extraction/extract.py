@@ -145,9 +145,9 @@ def extract(recording: PenRecording, options: ExtractOptions | None = None) -> E
         powers.append(_powers(part, *left_over(chain, part, through=fitted.through)))
         raw_powers.append(_raw_powers(pen, chain))
         trajectory = sigma_lognormal(chain, float(part.t[-1]))
-        parts.append(PartExtraction(part.t, part.p, part.v, trajectory, *_ratios(powers[-1]), count))
-    ratios = (*_ratios(np.sum(powers, axis=0)), *_ratios(np.sum(raw_powers, axis=0)))
-    return Extraction(recording.name, tuple(parts), *ratios, tuple(remarks), still)
+        parts.append(PartExtraction(part.t, part.p, part.v, trajectory, *ratios(powers[-1]), count))
+    snr, raw_snr = ratios(np.sum(powers, axis=0)), ratios(np.sum(raw_powers, axis=0))
+    return Extraction(recording.name, tuple(parts), *snr, *raw_snr, tuple(remarks), still)
 
 
 def _powers(signal: Trace, p_left: Array, v_left: Array) -> Array:
@@ -165,8 +165,8 @@ def _raw_powers(part: PenPart, chain: Chain) -> Array:
     return _powers(Trace(part.t, part.p, v), p_left, v_left)
 
 
-def _ratios(powers: Array) -> tuple[float, float]:
-    """SNR_v and SNR_t, dB."""
+def ratios(powers: Array) -> tuple[float, float]:
+    """SNR_v and SNR_t, dB, by powers: of velocity and its error, of position and its error."""
     return decibels(powers[0], powers[1]), decibels(powers[2], powers[3])
 
 

@@ -280,8 +280,9 @@ def _gains(left: Array, kernel: Array) -> Array:
     """Energy that the kernel, centred at each sample, explains; near the ends a cut kernel, rescaled."""
     n, reach = len(left), len(kernel) // 2
     power = np.convolve(np.ones(n), kernel**2)[reach : reach + n]
-    total: Array = sum(np.convolve(column, kernel)[reach : reach + n] ** 2 for column in left.T)
-    return total / power
+    found = [np.convolve(column, kernel)[reach : reach + n] ** 2 for column in left.T]
+    gains: Array = np.sum(found, axis=0) / power
+    return gains
 
 
 def _subtract(left: Array, kernel: Array, at: int) -> None:

@@ -97,12 +97,12 @@ def ordered_part(t: ArrayLike, p: ArrayLike) -> tuple[PenPart | None, tuple[str,
     """
     times, points = np.asarray(t, dtype=np.float64), np.asarray(p, dtype=np.float64)
     finite = np.isfinite(times) & np.isfinite(points).all(axis=1)
-    counted = {"that are not numbers left out": np.count_nonzero(~finite)}
+    counted = {"that are not numbers left out": int(np.sum(~finite))}
     times, points = times[finite], points[finite]
     part = None
     if len(times):
         ahead = times >= np.maximum.accumulate(times)
-        counted["with time running backwards left out"] = np.count_nonzero(~ahead)
+        counted["with time running backwards left out"] = int(np.sum(~ahead))
         unique, inverse, counts = np.unique(times[ahead], return_inverse=True, return_counts=True)
         counted["with a repeated time stamp merged by their mean"] = len(inverse) - len(unique)
         sums = np.zeros((len(unique), points.shape[1]))
@@ -154,7 +154,7 @@ class _Columns(NamedTuple):
     """Where x, y[, z], t stand in a line, how many columns it has, and the unit of t if it is given."""
 
     places: tuple[int, ...]
-    count: int
+    n_columns: int
     unit: str | None = None
 
 
@@ -190,9 +190,9 @@ def parse_pen(content: bytes, name: str, time_unit: str | None = None) -> PenRec
             columns = _columns(fields, where)
             if not _is_number(fields[columns.places[-1]]):
                 continue
-        elif len(fields) != columns.count:
+        elif len(fields) != columns.n_columns:
             raise RecordingError(
-                f"{where}: {len(fields)} columns after lines of {columns.count}; "
+                f"{where}: {len(fields)} columns after lines of {columns.n_columns}; "
                 "give every sample the same columns"
             )
         n_samples += 1
