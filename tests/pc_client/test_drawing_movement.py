@@ -250,7 +250,7 @@ def test_a_pen_up_move_that_is_too_fast_gets_time_and_the_marks_keep_theirs():
     gaps = least_gaps(marks, 0.06)
     recorded, slow = (
         factor_needed("x", join(marks, each, drawing.placement.lift), ARM)[1].max()
-        for each in (gaps, gaps + 3.0)
+        for each in (gaps, gaps + 1.5)
     )
     own = max(1.0, slow)
     assert recorded > 1.5 * own  # as recorded, the pen-up moves would slow the whole drawing down

@@ -19,6 +19,7 @@ from matplotlib.image import imread
 
 import pc_client.studies.executors as executors
 import pc_client.studies.extraction.batch as batch
+import pc_client.studies.extraction.figures as extraction_figures
 from pc_client import cli
 from pc_client.errors import ClientError
 from pc_client.movements.lognormal import Lognormal
@@ -88,7 +89,7 @@ def test_every_recording_has_an_outcome_in_its_place_and_few_jobs_are_in_flight(
     monkeypatch.setattr(batch, "_IN_FLIGHT", 2)
     told = []
     with open_executor(workers=1) as executor:
-        outcomes = extract_many(pen_sources([folder]), executor, n_pictures=2, on_outcome=told.append)
+        outcomes = extract_many(pen_sources([folder]), executor, on_outcome=told.append)
     names = [str(folder / name) for name in ("a.csv", "b.csv", "c.csv", "d.txt", "e.txt")]
     assert [outcome.name for outcome in outcomes] == names
     assert sorted(outcome.name for outcome in told) == names
@@ -100,8 +101,7 @@ def test_every_recording_has_an_outcome_in_its_place_and_few_jobs_are_in_flight(
     assert 'line 2: "nothing" is not a number' in b.error
     assert "no text file" in e.error
     assert (b.row, e.row) == (None, None)
-    assert a.picture.startswith(b"\x89PNG")
-    assert [outcome.picture for outcome in outcomes[1:]] == [None] * 4
+    assert [outcome.picture for outcome in outcomes] == [None] * 5
 
 
 def test_an_executor_that_breaks_down_is_one_line(folder):
@@ -109,16 +109,23 @@ def test_an_executor_that_breaks_down_is_one_line(folder):
         extract_many(pen_sources([folder]), AtOnce(broken_from=1))
 
 
-def test_a_fault_of_ours_costs_one_recording(folder, monkeypatch):
+@pytest.fixture
+def no_ink(monkeypatch):
+    """Pictures of recordings are drawn at once."""
+    monkeypatch.setattr(extraction_figures, "draw_extraction", lambda extraction: b"PNG")
+
+
+def test_a_fault_of_ours_costs_one_recording(folder, monkeypatch, no_ink):
     def faulty(recording, options):
         if recording.name.endswith("a.csv"):
             raise ZeroDivisionError("division by zero")
         return extract(recording, options)
 
     monkeypatch.setattr(batch, "extract", faulty)
-    outcomes = extract_many(pen_sources([folder]), AtOnce())
+    outcomes = extract_many(2 * pen_sources([folder]), AtOnce(), n_pictures=5)
     assert "a.csv: the extraction failed (ZeroDivisionError" in outcomes[0].error
     assert outcomes[2].row is not None
+    assert [outcome.picture for outcome in outcomes] == [None, None, b"PNG", *[None] * 7]
 
 
 def test_json_has_no_nan_and_the_stated_keys():
@@ -250,7 +257,9 @@ def test_nothing_that_can_be_used_still_gives_a_list(here, capsys):
     assert capsys.readouterr().err == f"ur-client: {why}\n"
 
 
-def test_archives_and_folders_and_pictures_that_lie_in_the_folder_whatever_names_an_archive_has(here, capsys):
+def test_archives_and_folders_and_pictures_that_lie_in_the_folder_whatever_names_an_archive_has(
+    here, capsys, no_ink
+):
     inside = ["inside/one.csv", "../../evil.csv", "-a\x1b[2J.csv"]
     with zipfile.ZipFile(here / "all.zip", "w") as archive:
         for name in inside:

@@ -252,7 +252,7 @@ rows = st.lists(
         st.one_of(st.floats(-1e6, 1e6), st.sampled_from([math.nan, math.inf, 0.0])),
     ),
     min_size=1,
-    max_size=20,
+    max_size=12,
 )
 
 
