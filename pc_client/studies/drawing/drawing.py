@@ -136,9 +136,8 @@ class Drawing:
 
     def planned(self, t: Array, mark: int) -> Motion:
         """The plan at times of the recording that belong to a mark, in its frame, unit and time."""
-        motion = self.joined.trajectory.evaluate(t + self.joined.shifts[mark])
-        back = inverse(self.placement.similarity)
-        return Motion(back.points(motion.p), back.vectors(motion.v), back.vectors(motion.a))
+        plan = self.joined.trajectory.transformed(inverse(self.placement.similarity))
+        return plan.evaluate(t + self.joined.shifts[mark])
 
 
 def make_drawing(

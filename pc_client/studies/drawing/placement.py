@@ -31,7 +31,6 @@ from pc_client.movements.recipes import largest_scale
 from pc_client.movements.sigma_lognormal import SigmaLognormal
 from pc_client.movements.trajectory import Similarity, about_z
 from pc_client.studies.extraction.extract import Extraction
-from pc_client.studies.extraction.pen import PenPart
 
 #: Deviation at which a speed profile is over for every purpose: 1e-9 of its length is left.
 _OVER = 6.0
@@ -114,24 +113,15 @@ def marks_of(extraction: Extraction) -> tuple[Mark, ...]:
         raise MovementError(
             f"{extraction.name}: holds no movement, only dots; give a drawing with a line in it"
         )
-    marks = [
-        Mark(
-            float(part.t[0]),
-            float(part.t[-1]),
-            part.trajectory.target_points[0],
-            part.trajectory.target_points[-1],
-            part.trajectory,
-        )
-        for part in extraction.parts
-    ]
-    marks += [_dot(part) for part in extraction.still]
+    marks = []
+    for part in extraction.parts:
+        points = part.trajectory.target_points
+        marks.append(Mark(float(part.t[0]), float(part.t[-1]), points[0], points[-1], part.trajectory))
+    for still in extraction.still:
+        dot = np.zeros(3)
+        dot[: still.p.shape[1]] = still.p.mean(axis=0)
+        marks.append(Mark(float(still.t[0]), float(still.t[-1]), read_only(dot), read_only(dot), None))
     return tuple(sorted(marks, key=lambda mark: mark.begin))
-
-
-def _dot(part: PenPart) -> Mark:
-    point = np.zeros(3)
-    point[: part.p.shape[1]] = part.p.mean(axis=0)
-    return Mark(float(part.t[0]), float(part.t[-1]), read_only(point), read_only(point), None)
 
 
 _HALF = math.sqrt(0.5)
@@ -226,21 +216,18 @@ def place(marks: Sequence[Mark], drawn: Array, options: PlacementOptions, *, fla
     path = np.vstack([mark.path(_PATH_SHARE * extent) for mark in marks])
     # Seen from the side that the pen is on, the recording's third axis points away where y points down.
     sense = 1.0 if y_up or not flat else -1.0
-    if options.rotation is None:
-        angles = [math.radians(0.5 * step) for step in range(360)]
-    else:
-        angles = [options.rotation]
-    rotations = [(angle, frame @ about_z(sense * angle)) for angle in angles]
-    scales = [largest_scale(path @ R.T, options.box.size - np.abs(lift)) for _, R in rotations]
+    half_degrees = [math.radians(0.5 * step) for step in range(360)]
+    angles = half_degrees if options.rotation is None else [options.rotation]
+    rotations = [frame @ about_z(sense * angle) for angle in angles]
+    scales = [largest_scale(path @ R.T, options.box.size - np.abs(lift)) for R in rotations]
     best = int(np.argmax(scales))
-    angle, R = rotations[best]
-    wanted = math.inf if options.size is None else options.size / extent
-    scale = min(scales[best], wanted)
+    R = rotations[best]
+    scale = scales[best] if options.size is None else min(scales[best], options.size / extent)
     turned = scale * path @ R.T
     low = turned.min(axis=0) + np.minimum(lift, 0.0)
     high = turned.max(axis=0) + np.maximum(lift, 0.0)
     similarity = Similarity(scale, R, options.box.centre - 0.5 * (low + high))
-    return Placement(similarity, read_only(lift), angle, options.plane if flat else "space", y_up)
+    return Placement(similarity, read_only(lift), angles[best], options.plane if flat else "space", y_up)
 
 
 def inverse(similarity: Similarity) -> Similarity:
