@@ -213,20 +213,19 @@ def judge(drawing: Drawing, executions: Sequence[Execution]) -> Verdict:
 
 def _judge_run(drawing: Drawing, execution: Execution) -> RunVerdict:
     run, metres = execution.run, drawing.placement.similarity.scale
-    pairs = _against_plan(drawing, execution)
-    errors = np.concatenate([np.linalg.norm(pair.actual - pair.reference, axis=1) for pair in pairs])
-    heights = np.concatenate([np.abs(pair.actual[:, 2]) for pair in pairs])
+    plan, human = _pairs(drawing, execution)
+    errors = np.concatenate([np.linalg.norm(pair.actual - pair.reference, axis=1) for pair in plan])
+    heights = np.concatenate([np.abs(pair.actual[:, 2]) for pair in plan])
     # What is left of the error when the delay is undone is, in its mean, the offset of the nominal arm.
     lag = run.snr.velocity_lag_s
-    aligned = executed(drawing, run, lag)
-    aligned_pairs = _against_plan(drawing, aligned)
-    offset = np.vstack([pair.actual - pair.reference for pair in aligned_pairs]).mean(axis=0)
+    aligned_plan, aligned_human = _pairs(drawing, executed(drawing, run, lag))
+    offset = np.vstack([pair.actual - pair.reference for pair in aligned_plan]).mean(axis=0)
     return RunVerdict(
         repetition=run.provenance.repetition,
-        planned=_agreement(pairs),
-        human=_agreement(_against_human(drawing, execution)),
-        planned_aligned=_agreement(aligned_pairs, offset),
-        human_aligned=_agreement(_against_human(drawing, aligned), offset),
+        planned=_agreement(plan),
+        human=_agreement(human),
+        planned_aligned=_agreement(aligned_plan, offset),
+        human_aligned=_agreement(aligned_human, offset),
         lag=lag,
         offset=metres * float(np.linalg.norm(offset)),
         speed_db=run.snr.speed_db,
@@ -244,20 +243,14 @@ class _Pair(NamedTuple):
     actual: Array
 
 
-def _against_plan(drawing: Drawing, execution: Execution) -> list[_Pair]:
-    """Planned and executed positions of each part at the robot's time stamps."""
-    return [
-        _Pair(part.frame_t, drawing.planned(part.frame_t, mark).p, part.frame_p)
-        for mark, part in zip(drawing.moving, execution.parts, strict=True)
-    ]
-
-
-def _against_human(drawing: Drawing, execution: Execution) -> list[_Pair]:
-    """Recorded and executed positions of each part at the robot's time stamps."""
-    return [
-        _Pair(part.frame_t, CubicSpline(human.t, spatial(human.p))(part.frame_t), part.frame_p)
-        for human, part in zip(drawing.extraction.parts, execution.parts, strict=True)
-    ]
+def _pairs(drawing: Drawing, execution: Execution) -> tuple[list[_Pair], list[_Pair]]:
+    """Positions as planned and as recorded, each with those that the robot reported, at its time stamps."""
+    plan, human = [], []
+    for mark, own, part in zip(drawing.moving, drawing.extraction.parts, execution.parts, strict=True):
+        t, p = part.frame_t, part.frame_p
+        plan.append(_Pair(t, drawing.planned(t, mark).p, p))
+        human.append(_Pair(t, CubicSpline(own.t, spatial(own.p))(t), p))
+    return plan, human
 
 
 def _agreement(pairs: Iterable[_Pair], offset: Array | float = 0.0) -> Agreement:
