@@ -66,10 +66,13 @@ def test_a_perfect_arm_gives_the_plan_itself(drawing):
         np.testing.assert_allclose(np.diff(part.frame_t), step, atol=1e-9)
         assert len(part.frame_t) >= math.floor((own.t[-1] - own.t[0]) / step)
         np.testing.assert_allclose(part.frame_p, drawing.planned(part.frame_t, mark).p, atol=1e-8)
-    verdict = judge(drawing, [execution]).runs[0]
+    whole = judge(drawing, [execution])
+    verdict = whole.runs[0]
     assert verdict.planned.snr_v_db > 120.0
     assert verdict.planned.snr_t_db > 120.0
     assert verdict.max_error < 1e-9
+    assert verdict.human.snr_v_db == pytest.approx(whole.plan.snr_v_db, abs=2.0)  # as near as the plan is
+    assert verdict.human.snr_t_db == pytest.approx(whole.plan.snr_t_db, abs=2.0)
 
 
 def test_times_map_back_exactly(drawing):

@@ -43,13 +43,13 @@ class AtOnce(Executor):
     """Does each job when it is submitted; from `broken_from` on, its workers are dead."""
 
     def __init__(self, broken_from=99):
-        self.n_jobs, self.broken_from = 0, broken_from
+        self.events, self.broken_from = [], broken_from
 
     def submit(self, function, *arguments):
-        self.n_jobs += 1
+        self.events.append("job")
         future = Future()
         try:
-            if self.n_jobs > self.broken_from:
+            if self.events.count("job") > self.broken_from:
                 raise BrokenExecutor("out of memory")
             future.set_result(function(*arguments))
         except Exception as error:
@@ -85,8 +85,7 @@ def row(*values):
 DOT = (None, None, None, None, 0, 0)
 
 
-def test_every_recording_has_an_outcome_in_its_place_and_few_jobs_are_in_flight(folder, monkeypatch):
-    monkeypatch.setattr(batch, "_IN_FLIGHT", 2)
+def test_every_recording_has_an_outcome_in_its_place(folder):
     told = []
     with open_executor(workers=1) as executor:
         outcomes = extract_many(pen_sources([folder]), executor, on_outcome=told.append)
@@ -115,14 +114,22 @@ def no_ink(monkeypatch):
     monkeypatch.setattr(extraction_figures, "draw_extraction", lambda extraction: b"PNG")
 
 
-def test_a_fault_of_ours_costs_one_recording(folder, monkeypatch, no_ink):
+def test_a_fault_of_ours_costs_one_recording_and_few_jobs_are_in_flight(folder, monkeypatch, no_ink):
+    monkeypatch.setattr(batch, "_IN_FLIGHT", 2)
+    executor = AtOnce()
+
     def faulty(recording, options):
         if recording.name.endswith("a.csv"):
             raise ZeroDivisionError("division by zero")
         return extract(recording, options)
 
     monkeypatch.setattr(batch, "extract", faulty)
-    outcomes = extract_many(2 * pen_sources([folder]), AtOnce(), n_pictures=5)
+
+    def tell(outcome):
+        executor.events.append("told")
+
+    outcomes = extract_many(2 * pen_sources([folder]), executor, n_pictures=5, on_outcome=tell)
+    assert "job job job" not in " ".join(executor.events)
     assert "a.csv: the extraction failed (ZeroDivisionError" in outcomes[0].error
     assert outcomes[2].row is not None
     assert [outcome.picture for outcome in outcomes] == [None, None, b"PNG", *[None] * 7]

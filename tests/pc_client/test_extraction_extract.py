@@ -50,6 +50,13 @@ def test_own_strokes_come_back_at_any_rate(seed, dim, rate):
     assert result.lognormality == pytest.approx(result.snr_v_db / 5)
 
 
+def test_strokes_that_are_added_between_the_peaks_come_back_as_clean():
+    trajectory = own_strokes(8, 2, n=3, overlap=0.6)
+    result = extract(recorded(trajectory, 2))
+    assert result.snr_v_db >= 100.0  # judged through the low-pass
+    check_own(result, trajectory)
+
+
 @pytest.mark.parametrize("stroke_time", [0.25, 0.35])
 def test_strokes_as_fast_as_handwriting_come_back_though_the_low_pass_blunts_them(stroke_time):
     trajectory = own_strokes(102, 2, stroke_time=stroke_time)

@@ -11,6 +11,7 @@ import math
 
 import numpy as np
 import pytest
+from extraction_samples import own_strokes, recorded
 from hypothesis import example, given
 from hypothesis import strategies as st
 
@@ -240,6 +241,8 @@ def test_inserted_strokes_move_nothing_and_taking_them_out_gives_the_chain_back(
     back = without(longer, np.isin(longer.median, [0.9, 0.31]))
     assert back.targets == pytest.approx(chain.targets)
     assert back.width == pytest.approx(chain.width)
+    shorter = without(chain, np.arange(4) == 3)
+    assert shorter.targets == pytest.approx(chain.targets[[0, 1, 2, 4]])  # the end of the whole is kept
 
 
 def test_strokes_put_in_order_still_make_the_same_movement():
@@ -250,6 +253,13 @@ def test_strokes_put_in_order_still_make_the_same_movement():
     sorted_ = in_order(shuffled)
     assert sorted_.median.tolist() == sorted(chain.median.tolist())
     assert linearise(sorted_, TIMES, 0, 4).p == pytest.approx(linearise(shuffled, TIMES, 0, 4).p, abs=1e-12)
+
+
+def test_first_strokes_in_space_turn_in_planes_through_their_chords():
+    (part,) = recorded(own_strokes(0, 3), 3).parts
+    chain = initial_chain(smooth_part(part))
+    assert np.abs(chain.arc_angle).max() > 0.3
+    assert np.einsum("ij,ij->i", chain.normal, chain.chords) == pytest.approx(np.zeros(5), abs=1e-9)
 
 
 def test_normals_of_chords_they_are_parallel_to_are_still_across():

@@ -163,6 +163,7 @@ def test_the_urdf_is_the_arm_and_needs_no_other_file(tmp_path: Path, arm: str) -
     model = pin.buildModelFromXML(text)
     assert list(model.names)[1:] == JOINTS
     np.testing.assert_allclose(model.upperPositionLimit, ROBOTS[arm].limits.q_max, rtol=1e-5)
+    np.testing.assert_allclose(model.velocityLimit, ROBOTS[arm].limits.qd_max, rtol=1e-5)
     data = model.createData()
     for row in (0, 77, 150):
         pin.framesForwardKinematics(model, data, angles(row))
