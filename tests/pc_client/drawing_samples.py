@@ -35,7 +35,7 @@ def two_parts_and_a_dot(gap=0.6, dot=True):
         begin + 0.33,
     )
     still = (PenPart(np.array([begin + 1.2]), np.array([[50.0, 95.0]])),) if dot else ()
-    return Extraction("two/parts.txt", (first, second), 60.0, 60.0, still=still)
+    return Extraction("two/parts.txt", (first, second), 60.0, 60.0, remarks=("a gap",), still=still)
 
 
 def one_part():

@@ -159,5 +159,6 @@ def test_the_tables_agree(entry):
     markdown = drawings_markdown([entry])
     assert f"{entry.verdict.runs[0].human.snr_v_db:.2f}" in markdown
     assert f"{entry.drawing.factor:.3f} times" in markdown
+    assert "- remark 1: a gap" in markdown
     twice = 2 * entry.executions
     assert "executed r1" in drawings_markdown([Entry(entry.drawing, twice, judge(entry.drawing, twice))])

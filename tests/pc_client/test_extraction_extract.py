@@ -244,8 +244,8 @@ def test_short_parts_have_a_stroke(n, duration, dim):
 
 @pytest.mark.parametrize("dim", [2, 3])
 def test_there_and_back_again_has_a_stroke_with_a_chord(dim):
-    t = np.linspace(0.0, 0.3, 3)
-    p = np.eye(3, dim)[[1, 0, 1]]
+    t = np.linspace(0.0, 0.5, 5)
+    p = np.eye(1, dim) * [[0.0], [1.0], [0.0], [-1.0], [0.0]]
     result = extract(PenRecording("back", (PenPart(t, p),)))
     assert result.n_strokes >= 1
     assert math.isfinite(result.snr_v_db)

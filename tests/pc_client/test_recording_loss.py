@@ -150,6 +150,15 @@ def test_a_changed_provenance_is_noticed(tmp_path: Path, whole: bytes) -> None:
     assert "checksum over all records" in recording.damage
 
 
+def test_a_summary_that_cannot_be_read_is_left_out(tmp_path: Path) -> None:
+    with Recorder(tmp_path / "a.mcap", provenance(), SIGNALS) as recorder:
+        recorder.close({"snr_db": 31.5})
+    data = (tmp_path / "a.mcap").read_bytes()
+    recording = load_bytes(tmp_path, data.replace(b"31.5", b"31.x"))
+    assert recording.summary == {}
+    assert not recording.complete
+
+
 @given(st.lists(st.tuples(st.integers(0, 20_000), st.integers(0, 255)), min_size=1, max_size=4))
 def test_no_damage_makes_the_loader_fail_otherwise(
     tmp_path_factory: pytest.TempPathFactory, changes: list[tuple[int, int]]
