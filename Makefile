@@ -6,6 +6,9 @@ STAMP := $(VENV)/.installed
 # A file is one process's; those with slow tests come first (tests/conftest.py), so that no core waits at the end.
 PYTEST := $(BIN)/python -m pytest --numprocesses auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 
+# Threads of OpenBLAS that wait for a core cost more than they bring: an extraction takes ten times the processor time.
+export OPENBLAS_NUM_THREADS := 1
+
 # Options of the command behind a target: make bench ARGS=--short, make attack ARGS='--box rack'.
 ARGS ?=
 

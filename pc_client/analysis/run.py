@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pc_client.analysis import measures
 from pc_client.errors import RecordingError
 from pc_client.recording.provenance import Provenance
 from pc_client.recording.recording import Recording
-
-if TYPE_CHECKING:
-    pass
 
 GIVEN_UP = "given up"
 """Kind of the movement of a run that did not come to its end."""

@@ -14,8 +14,9 @@ from pc_client.analysis import measures
 from pc_client.analysis.run import MeasuredRun, analyse_run
 from pc_client.arrays import Array
 from pc_client.driver.velocity_stream import StreamReport
+from pc_client.recording.export import flat_columns, split_columns, table_of
 from pc_client.recording.provenance import Source, origin_of
-from pc_client.recording.recording import Recording, flat_columns, load_recording, split_columns, table_of
+from pc_client.recording.recording import Recording, load_recording
 
 if TYPE_CHECKING:
     import polars

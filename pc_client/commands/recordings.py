@@ -69,7 +69,7 @@ def export(
     ] = None,
 ) -> None:
     """Write the rows of a recording as a table."""
-    from pc_client.recording.recording import export as write_table
+    from pc_client.recording.export import export as write_table
     from pc_client.recording.recording import load_recording
 
     recording = load_recording(file)

@@ -11,15 +11,11 @@ written 25 times a second, whatever the control cycle, so that a file grows litt
     /tcp_pose            reported TCP pose in `base`
     /desired_tcp_pose    the reference's position, with the orientation of ref_q, in `base`
 
-Joints are those of the arm's URDF. In example-robot-data its meshes are addresses that only an installation
-with the same package resolves, and its limits are wrong (see `kinematics.arms`), so the URDF made here has
-cylinders and the client's own limits. It has no masses and no torques.
-
-Pinocchio computes the poses. `mcap_ros2` would encode the messages in four times the time: it asks for each
-field of each message, where one `Struct` packs a message whose texts and counts stay the same.
-
 Frames: `base_link` is the root, `base` is UR's frame (`base_link` turned by pi about z), `tool0` the flange.
 Quaternions are (x, y, z, w).
+
+`mcap_ros2` takes three times as long to encode the messages as all of `show` does: it asks for each field of
+each message, where one `Struct` packs a message whose texts and counts stay the same.
 
 Source of the messages: ROS 2 common_interfaces, geometry2 (fields only); OMG CDR (XCDR1) alignment rules.
 """
@@ -52,6 +48,9 @@ _FIXED = (("base_link", "base"), ("wrist_3_link", "tool0"))
 _THICKNESS = 0.05
 """Radius of a tube over the reach of the arm. A choice: it looks like the real arms."""
 
+PERIOD = 0.04
+"""Time between two views of the arm [s]."""
+
 
 @dataclass(frozen=True, slots=True)
 class ArmTree:
@@ -75,35 +74,32 @@ def arm_tree(description: RobotDescription) -> ArmTree:
 
 
 def _urdf(description: RobotDescription, source: str) -> str:
-    """The joints of a URDF with bodies and limits of our own."""
+    """The joints of a URDF of example-robot-data, with bodies and limits of our own.
+
+    Its meshes are addresses that only an installation with the same package resolves, and its limits are
+    wrong (see `kinematics.arms`). There are no masses and no torques.
+    """
     radius, limits = _THICKNESS * description.reach, description.limits
     robot = Element("robot", name=description.name)
-    names = (*_LINKS, *(child for _, child in _FIXED))
-    links = {name: SubElement(robot, "link", name=name) for name in names}
+    links = {name: SubElement(robot, "link", name=name) for name in (*_LINKS, *dict(_FIXED).values())}
     for joint in ElementTree.fromstring(source).findall("joint"):
-        parent, child, origin = (_part(joint, tag) for tag in ("parent", "child", "origin"))
-        before, link = (links.get(str(end.get("link"))) for end in (parent, child))
-        if before is None or link is None:  # `world` and `ee_link` hold no body, and nothing refers to them
+        parts = {part.tag: part for part in joint}
+        parent, child = (str(parts[end].get("link")) for end in ("parent", "child"))
+        if parent not in links or child not in links:  # `world` and `ee_link` hold no body
             continue
         element = SubElement(robot, "joint", name=str(joint.get("name")), type=str(joint.get("type")))
-        element.extend((parent, child, origin))
-        _add_tubes(before, _numbers(origin), radius)
+        element.extend(parts[tag] for tag in ("parent", "child", "origin"))
+        _add_tubes(links[parent], _numbers(parts["origin"]), radius)
         if joint.get("type") != "fixed":
-            axis, k = _part(joint, "axis"), names.index(str(link.get("name"))) - 1
+            k = _LINKS.index(child) - 1
             bounds = {"lower": limits.q_min[k], "upper": limits.q_max[k], "velocity": limits.qd_max[k]}
-            element.append(axis)
+            element.append(parts["axis"])
             # URDF demands an effort, and 0 says that none is given.
             SubElement(element, "limit", {name: f"{x:.6g}" for name, x in bounds.items()} | {"effort": "0"})
-            along = int(np.abs(_numbers(axis)).argmax())
-            _add_cylinder(link, np.zeros(3), along, 2.6 * radius, 1.2 * radius, is_joint=True)
+            along = int(np.abs(_numbers(parts["axis"])).argmax())
+            _add_cylinder(links[child], np.zeros(3), along, 2.6 * radius, 1.2 * radius, is_joint=True)
     ElementTree.indent(robot)
     return ElementTree.tostring(robot, encoding="unicode") + "\n"
-
-
-def _part(joint: Element, tag: str) -> Element:
-    part = joint.find(tag)
-    assert part is not None
-    return part
 
 
 def _numbers(part: Element) -> Array:
@@ -125,68 +121,59 @@ def _add_cylinder(
 ) -> None:
     xyz = " ".join(f"{round(number, 9) + 0.0:.10g}" for number in centre)
     rpy = ("0 1.570796327 0", "1.570796327 0 0", "0 0 0")[axis]
+    name, colour = ("joint", "0.35 0.55 0.75 1") if is_joint else ("tube", "0.75 0.77 0.8 1")
     visual = SubElement(link, "visual")
     SubElement(visual, "origin", xyz=xyz, rpy=rpy)
     geometry = SubElement(visual, "geometry")
     SubElement(geometry, "cylinder", length=f"{length:.6g}", radius=f"{radius:.6g}")
-    material = SubElement(visual, "material", name="joint" if is_joint else "tube")
-    SubElement(material, "color", rgba="0.35 0.55 0.75 1" if is_joint else "0.75 0.77 0.8 1")
+    SubElement(SubElement(visual, "material", name=name), "color", rgba=colour)
 
 
 CDR_LITTLE_ENDIAN = b"\x00\x01\x00\x00"
 
-_JOINT_STATE = "sensor_msgs/msg/JointState"
-POSE = "geometry_msgs/msg/PoseStamped"
-_TRANSFORMS = "tf2_msgs/msg/TFMessage"
-TEXT = "std_msgs/msg/String"
+_STRING, _POSE = "std_msgs/msg/String", "geometry_msgs/msg/PoseStamped"
+_JOINT_STATE, _TRANSFORMS = "sensor_msgs/msg/JointState", "tf2_msgs/msg/TFMessage"
 
-_FIELDS = {
-    _JOINT_STATE: (
-        "std_msgs/Header header",
-        *("string[] name", "float64[] position", "float64[] velocity", "float64[] effort"),
-    ),
-    POSE: ("std_msgs/Header header", "geometry_msgs/Pose pose"),
+_JOINT_FIELDS = ("string[] name", "float64[] position", "float64[] velocity", "float64[] effort")
+_XYZ = ("float64 x", "float64 y", "float64 z")
+_FIELDS: dict[str, tuple[str, ...]] = {
+    _STRING: ("string data",),
+    _POSE: ("std_msgs/Header header", "geometry_msgs/Pose pose"),
+    _JOINT_STATE: ("std_msgs/Header header", *_JOINT_FIELDS),
     _TRANSFORMS: ("geometry_msgs/TransformStamped[] transforms",),
-    TEXT: ("string data",),
     "std_msgs/Header": ("builtin_interfaces/Time stamp", "string frame_id"),
     "builtin_interfaces/Time": ("int32 sec", "uint32 nanosec"),
     "geometry_msgs/Pose": ("geometry_msgs/Point position", "geometry_msgs/Quaternion orientation"),
-    "geometry_msgs/Point": ("float64 x", "float64 y", "float64 z"),
-    "geometry_msgs/Vector3": ("float64 x", "float64 y", "float64 z"),
-    "geometry_msgs/Quaternion": ("float64 x", "float64 y", "float64 z", "float64 w"),
+    "geometry_msgs/Point": _XYZ,
+    "geometry_msgs/Vector3": _XYZ,
+    "geometry_msgs/Quaternion": (*_XYZ, "float64 w"),
     "geometry_msgs/Transform": ("geometry_msgs/Vector3 translation", "geometry_msgs/Quaternion rotation"),
     "geometry_msgs/TransformStamped": (
-        "std_msgs/Header header",
-        *("string child_frame_id", "geometry_msgs/Transform transform"),
+        *("std_msgs/Header header", "string child_frame_id", "geometry_msgs/Transform transform"),
     ),
 }
 
-Value = int | float | bytes
-"""An int is a uint32 (also a length, and the two halves of a time), a float a float64, bytes a text."""
 
-
-def definition(message: str) -> str:
+def _definition(message: str) -> str:
     """The definition of a message with those of all messages inside it, as `ros2msg` schemas have them."""
     needed = [message]
     for name in needed:
         inside = (field.split()[0].removesuffix("[]") for field in _FIELDS[name])
         needed += [part for part in inside if part in _FIELDS and part not in needed]
-    head = "\n".join(_FIELDS[message]) + "\n"
-    parts = ("=" * 80 + f"\nMSG: {name}\n" + "\n".join(_FIELDS[name]) + "\n" for name in needed[1:])
-    return head + "".join(parts)
+    texts = ["\n".join(_FIELDS[name]) + "\n" for name in needed]
+    parts = (f"{'=' * 80}\nMSG: {name}\n{text}" for name, text in zip(needed[1:], texts[1:], strict=True))
+    return texts[0] + "".join(parts)
 
 
-def text(value: str) -> tuple[Value, ...]:
-    """The values of a text."""
-    data = value.encode() + b"\0"
-    return len(data), data
+_Value = int | float | bytes
+"""An int is a uint32 (also a length, and the two halves of a time), a float a float64, bytes a text."""
 
 
-def _ends(parent: str, child: str) -> tuple[Value, ...]:
-    return (*text(parent), *text(child))
+def _texts(*texts: str) -> tuple[_Value, ...]:
+    return tuple(value for text in texts for value in (len(text.encode()) + 1, text.encode() + b"\0"))
 
 
-def _layout(values: Sequence[Value]) -> Struct:
+def _layout(values: Sequence[_Value]) -> Struct:
     """How a message with values of these types and lengths lies behind the head of CDR.
 
     There, as in C, a number begins at a multiple of its size.
@@ -194,9 +181,6 @@ def _layout(values: Sequence[Value]) -> Struct:
     letters = (f"{len(v)}s" if isinstance(v, bytes) else "d" if isinstance(v, float) else "I" for v in values)
     return Struct("".join(letters))
 
-
-PERIOD = 0.04
-"""Time between two views of the arm [s]."""
 
 # `ros2 bag play` publishes such a topic so that a node that starts later gets its last message, too.
 _LATCHED = """\
@@ -212,17 +196,17 @@ _LATCHED = """\
 """
 
 _TOPICS = {
-    "/robot_description": (TEXT, {"offered_qos_profiles": _LATCHED}),
+    "/robot_description": (_STRING, {"offered_qos_profiles": _LATCHED}),
     "/tf_static": (_TRANSFORMS, {"offered_qos_profiles": _LATCHED}),
     "/tf": (_TRANSFORMS, {}),
     "/joint_states": (_JOINT_STATE, {}),
-    "/tcp_pose": (POSE, {}),
-    "/desired_tcp_pose": (POSE, {}),
+    "/tcp_pose": (_POSE, {}),
+    "/desired_tcp_pose": (_POSE, {}),
 }
 
-_BASE = text("base")
-_ACTUAL_TCP, _DESIRED_TCP = _ends("base", "actual_tcp"), _ends("base", "desired_tcp")
-_MOVING_ENDS = [_ends(*ends) for ends in pairwise(_LINKS)]
+_BASE = _texts("base")
+_ACTUAL_TCP, _DESIRED_TCP = _texts("base", "actual_tcp"), _texts("base", "desired_tcp")
+_MOVING_ENDS = [_texts(*ends) for ends in pairwise(_LINKS)]
 
 
 class ArmView:
@@ -233,14 +217,14 @@ class ArmView:
         self._base, self._flange = (arm.model.getFrameId(child) for _, child in _FIXED)
         self._writer = writer
         self._every = max(1, round(PERIOD / cycle_time))
-        self._names = [part for name in list(arm.model.names)[1:] for part in text(name)]
+        self._names = _texts(*list(arm.model.names)[1:])
         self._q, self._qd, self._pose = (
             slice(columns.index(name), columns.index(name) + 6)
             for name in ("actual_q", "actual_qd", "actual_TCP_pose")
         )
         schemas = {
-            message: writer.register_schema(message, "ros2msg", definition(message).encode())
-            for message in (TEXT, _TRANSFORMS, _JOINT_STATE, POSE)
+            message: writer.register_schema(message, "ros2msg", _definition(message).encode())
+            for message in (_STRING, _TRANSFORMS, _JOINT_STATE, _POSE)
         }
         self._channels = {
             topic: writer.register_channel(topic, "cdr", schemas[message], metadata)
@@ -275,12 +259,12 @@ class ArmView:
         T_base_flange = data.oMf[self._base].actInv(data.oMf[self._flange])
         desired = (*ref_p, *pin.SE3ToXYZQUATtuple(T_base_flange)[3:])
         pin.forwardKinematics(model, data, frame[self._q])
-        values: list[Value] = [len(_MOVING_ENDS) + 2]
+        values: list[_Value] = [len(_MOVING_ENDS) + 2]
         for joint, ends in enumerate(_MOVING_ENDS, 1):
             values += [*stamp, *ends, *pin.SE3ToXYZQUATtuple(data.liMi[joint])]
         values += [*stamp, *_ACTUAL_TCP, *tcp, *stamp, *_DESIRED_TCP, *desired]
         self._write("/tf", log_time, values)
-        self._write("/joint_states", log_time, [*stamp, *text(""), 6, *self._names, 6, *q, 6, *qd, 0])
+        self._write("/joint_states", log_time, [*stamp, *_texts(""), 6, *self._names, 6, *q, 6, *qd, 0])
         self._write("/tcp_pose", log_time, [*stamp, *_BASE, *tcp])
         self._write("/desired_tcp_pose", log_time, [*stamp, *_BASE, *desired])
         self._n_shown += 1
@@ -288,18 +272,17 @@ class ArmView:
     def _begin(self, log_time: int, stamp: tuple[int, int]) -> None:
         """Write what is written once."""
         urdf, frames = self._arm.urdf, self._arm.model.frames
-        self._writer.add_attachment(
-            log_time, log_time, f"{self._arm.name}.urdf", "application/xml", urdf.encode()
-        )
-        self._write("/robot_description", log_time, text(urdf))
-        values: list[Value] = [len(_FIXED)]
+        name = f"{self._arm.name}.urdf"
+        self._writer.add_attachment(log_time, log_time, name, "application/xml", urdf.encode())
+        self._write("/robot_description", log_time, _texts(urdf))
+        values: list[_Value] = [len(_FIXED)]
         for ends, frame in zip(_FIXED, (self._base, self._flange), strict=True):
-            values += [*stamp, *_ends(*ends), *pin.SE3ToXYZQUATtuple(frames[frame].placement)]
+            values += [*stamp, *_texts(*ends), *pin.SE3ToXYZQUATtuple(frames[frame].placement)]
         self._write("/tf_static", log_time, values)
 
-    def _write(self, topic: str, log_time: int, values: Sequence[Value]) -> None:
+    def _write(self, topic: str, log_time: int, values: Sequence[_Value]) -> None:
         """Write a message; the texts in those of one topic and their counts stay the same."""
-        if (layout := self._layouts.get(topic)) is None:
-            layout = self._layouts[topic] = _layout(values)
-        data = CDR_LITTLE_ENDIAN + layout.pack(*values)
+        if topic not in self._layouts:
+            self._layouts[topic] = _layout(values)
+        data = CDR_LITTLE_ENDIAN + self._layouts[topic].pack(*values)
         self._writer.add_message(self._channels[topic], log_time, data, log_time, self._n_shown)

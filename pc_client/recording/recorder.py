@@ -171,7 +171,7 @@ class Recorder:
         Args:
             path: file to create; an existing one is replaced.
             provenance: written at the beginning, so that also a cut file says where it comes from.
-            state_signals: each column of the realtime frame in its order, as (name, count) or `Signal`.
+            state_signals: each column of the realtime frame in its order: name, count, and maybe the unit.
             arm: links and joints, for the topics by which viewers show a moving arm; None: no such topics.
             now: reads the clock of the PC, ns since 1970 (UTC), at the first row; the log times of all rows
                 are counted from there by the controller's stamps. None: they are the controller's time, so

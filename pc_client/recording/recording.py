@@ -1,13 +1,8 @@
-"""Reads a recording back, also one whose end is missing, and writes its rows as CSV, Parquet or MATLAB's MAT.
+"""Reads a recording back, also one whose end is missing.
 
 The reader goes through the file from its beginning and never needs the index at its end, so that a run that
 was killed loads up to its last whole row. Damage inside the file ends the reading there, and
 `Recording.complete` and `Recording.damage` say so.
-
-In a table, vectors become one column a component, `actual_q_0` .. `actual_q_5`, under the names of RTDE; the
-last columns say in every row whose data these are: robot, software, serial, simulated. In CSV the unit stands
-behind the name, `actual_q_0 [rad]`; in Parquet, as JSON under the key "units", beside the provenance. MAT has
-matrices, one row a cycle, under the names of `_MAT_VARIABLES`, and the provenance as a struct.
 """
 
 from __future__ import annotations
@@ -15,10 +10,10 @@ from __future__ import annotations
 import json
 import struct
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import Any
 from zlib import crc32
 
 import numpy as np
@@ -28,17 +23,13 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, Metadata, Schema
 from mcap.writer import MCAP0_MAGIC
 from numpy.typing import NDArray
-from scipy.io import savemat
 
 from pc_client.arrays import Array
 from pc_client.errors import RecordingError
 from pc_client.files import FILE_KINDS
 from pc_client.recording import rows
-from pc_client.recording.provenance import Provenance, Source
+from pc_client.recording.provenance import Provenance
 from pc_client.recording.rows import Phase, Signal, Topic
-
-if TYPE_CHECKING:
-    import polars
 
 _RECORD_HEAD = struct.Struct("<BQ")
 _CHUNK_HEAD_BYTES = 40  # of one that is not compressed
@@ -261,84 +252,3 @@ def _records(data: bytes, position: int) -> Iterator[tuple[int, int, int]]:
         start = position + _RECORD_HEAD.size
         position = start + length
         yield opcode, start, position
-
-
-_ExportFormat = Literal["csv", "parquet", "mat"]
-
-_MAT_VARIABLES = {
-    "t": "timestamp",
-    "q": "actual_q",
-    "qd": "actual_qd",
-    "tcp_pose": "actual_TCP_pose",
-    "qd_cmd": "cmd_qd",
-    **{name: name for name in ("phase", "ref_t", "ref_q", "ref_qd", "ref_tcp_position", "ref_tcp_velocity")},
-}
-"""Variables of a MAT file, and the signals that they hold."""
-
-
-def export(recording: Recording, path: Path | str, format: _ExportFormat = "csv") -> Path:
-    """Write all rows of a recording into one table; an existing file is replaced.
-
-    Args:
-        format: "csv" (full float precision), "parquet" or "mat" (carry the provenance too).
-
-    Raises:
-        RecordingError: unknown format, or the file cannot be written.
-    """
-    path = Path(path)
-    if format not in get_args(_ExportFormat):
-        raise RecordingError(f"cannot export to {format!r}; use one of {', '.join(get_args(_ExportFormat))}")
-    content = BytesIO()
-    if format == "mat":
-        recorded = {signal.name for signal in recording.signals}
-        kept = {name: recording.column(of) for name, of in _MAT_VARIABLES.items() if of in recorded}
-        whose = _mat_struct(asdict(recording.provenance))
-        savemat(content, {**kept, "provenance": whose}, long_field_names=True, oned_as="column")
-    else:
-        columns = flat_columns(recording)
-        table = table_of(columns, recording.provenance.source)
-        all_units = (unit for signal in recording.signals for unit in signal.units)
-        units = {name: unit for name, unit in zip(columns, all_units, strict=True) if unit}
-        if format == "csv":
-            table.rename({name: f"{name} [{unit}]" for name, unit in units.items()}).write_csv(content)
-        else:
-            facts = {**recording.provenance.to_metadata(), "units": json.dumps(units)}
-            table.write_parquet(content, metadata=facts)
-    try:
-        path.write_bytes(content.getbuffer())
-    except OSError as error:
-        raise RecordingError(f"cannot write {path}: {error.strerror or error}") from error
-    return path
-
-
-def _mat_struct(facts: Mapping[str, object]) -> dict[str, object]:
-    """Facts as fields of a struct: what is not known is the empty matrix."""
-    return {
-        name: [] if fact is None else _mat_struct(fact) if isinstance(fact, Mapping) else fact
-        for name, fact in facts.items()
-    }
-
-
-def table_of(columns: Mapping[str, Array], source: Source) -> polars.DataFrame:
-    """A table of columns (n,), with the columns of their source behind them."""
-    import polars
-
-    kinds = {"simulated": polars.Boolean}
-    constants = {name: polars.lit(value, kinds.get(name, polars.String)) for name, value in source.items()}
-    return polars.DataFrame(dict(columns)).with_columns(**constants)
-
-
-def flat_columns(recording: Recording) -> dict[str, Array]:
-    """Return every number of the rows as its own column (n,), in file order."""
-    return split_columns({signal.name: recording.column(signal.name) for signal in recording.signals})
-
-
-def split_columns(signals: Mapping[str, Array]) -> dict[str, Array]:
-    """Return every component of signals (n,) or (n, count) as its own column (n,), such as `actual_q_0`."""
-    columns: dict[str, Array] = {}
-    for name, values in signals.items():
-        if values.ndim == 1:
-            columns[name] = values
-        else:
-            columns.update({f"{name}_{i}": values[:, i] for i in range(values.shape[1])})
-    return columns

@@ -57,8 +57,8 @@ class Signal:
         return tuple(parts[k * len(parts) // self.count] for k in range(self.count))
 
 
-# What callers may hand in for a signal: itself, (name, count) or (name, count, unit).
-SignalLike = Signal | tuple[str, int] | tuple[str, int, str]
+SignalLike = tuple[str, int] | tuple[str, int, str]
+"""What callers hand in for a signal: name, count, and maybe the unit."""
 
 REFERENCE_SIGNALS = (
     Signal("ref_t", 1, "s"),
@@ -111,7 +111,7 @@ def row_topics(state_signals: Iterable[SignalLike]) -> tuple[Topic, Topic, Topic
     Raises:
         RecordingError: a name is not allowed in ROS 2, appears twice, or `timestamp` is missing.
     """
-    state = tuple(s if isinstance(s, Signal) else Signal(*s) for s in state_signals)
+    state = tuple(Signal(*each) for each in state_signals)
     topics = (
         Topic(STATE_TOPIC, "ur_hil/msg/RobotState", state),
         Topic(REFERENCE_TOPIC, "ur_hil/msg/Reference", REFERENCE_SIGNALS),

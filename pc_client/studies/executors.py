@@ -14,7 +14,7 @@ import signal
 import threading
 from collections.abc import Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from multiprocessing.connection import Connection
 
 from pc_client.errors import ClientError
@@ -31,8 +31,7 @@ _ONE_THREAD_EACH = {
 _DASK_TIMEOUT = "10s"
 
 
-@contextmanager
-def open_executor(workers: int | None = None, dask: str | None = None) -> Iterator[Executor]:
+def open_executor(workers: int | None = None, dask: str | None = None) -> AbstractContextManager[Executor]:
     """Open a place to run jobs; it is closed on leaving.
 
     On a regular end, jobs that were submitted are finished first. After an exception (Ctrl-C, an error of
@@ -49,13 +48,10 @@ def open_executor(workers: int | None = None, dask: str | None = None) -> Iterat
     if dask is not None:
         if workers is not None:
             raise ClientError(f"{workers} workers and a Dask cluster: the cluster has its own, give only one")
-        with _dask_cluster(dask) as executor:
-            yield executor
-        return
+        return _dask_cluster(dask)
     if workers is not None and workers < 1:
         raise ClientError(f"{workers} workers cannot do anything; give at least 1")
-    with _processes(usable_cores() if workers is None else workers) as executor:
-        yield executor
+    return _processes(usable_cores() if workers is None else workers)
 
 
 def usable_cores() -> int:

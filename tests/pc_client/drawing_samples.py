@@ -22,9 +22,7 @@ def part_of(trajectory, begin, end):
     """A part whose recording is exactly what its strokes say."""
     t = np.linspace(begin, end, round((end - begin) * 200) + 1)
     motion = trajectory.evaluate(t)
-    return PartExtraction(
-        t, motion.p[:, :2], motion.v[:, :2], trajectory, 60.0, 60.0, len(trajectory.strokes), 2
-    )
+    return PartExtraction(t, motion.p[:, :2], motion.v[:, :2], trajectory, 60.0, 60.0, 2)
 
 
 def two_parts_and_a_dot(gap=0.6, dot=True):
@@ -37,13 +35,13 @@ def two_parts_and_a_dot(gap=0.6, dot=True):
         begin + 0.33,
     )
     still = (PenPart(np.array([begin + 1.2]), np.array([[50.0, 95.0]])),) if dot else ()
-    return Extraction("two/parts.txt", (first, second), 60.0, 60.0, 4, 4, 15.0, (), still)
+    return Extraction("two/parts.txt", (first, second), 60.0, 60.0, remarks=("a gap",), still=still)
 
 
 def one_part():
     """A drawing of one part."""
     part = part_of(flat_trajectory([(20, 20), (60, 30), (55, 80)], (-0.15, 0.05), 0.3), 0.0, 0.3)
-    return Extraction("one.txt", (part,), 60.0, 60.0, 2, 2, 30.0, (), ())
+    return Extraction("one.txt", (part,), 60.0, 60.0)
 
 
 def recording_text(extraction):

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from drawing_samples import one_part, recording_text, two_parts_and_a_dot
+from drawing_samples import one_part, recording_text
 from page_support import check_needs_nothing
 
 import pc_client.commands.draw as draw_module
@@ -18,20 +18,26 @@ from pc_client.kinematics.arms import ROBOTS
 from pc_client.kinematics.model import robot_model
 from pc_client.movements.movement import load_movement
 from pc_client.recording.recording import load_recording
+from pc_client.studies.drawing import figures
+from pc_client.studies.drawing.figures import sheets_of
 
 
 @pytest.fixture
 def file(tmp_path):
     path = tmp_path / "letter a.txt"
-    path.write_text(recording_text(two_parts_and_a_dot()))
+    path.write_text(recording_text(one_part()))
     return path
 
 
-def test_drawings_become_recordings_tables_and_a_page_with_a_section_each(robot, tmp_path, capsys):
+def test_drawings_become_recordings_tables_and_a_page_with_a_section_each(
+    robot, tmp_path, capsys, monkeypatch
+):
+    # One of the three figures: the others are drawn by `test_drawing_judgement`.
+    monkeypatch.setattr(figures, "sheets_of", lambda shown: {"paths": sheets_of(shown)["paths"]})
     archive, out, saved = tmp_path / "two.zip", tmp_path / "out", tmp_path / "one.toml"
     with zipfile.ZipFile(archive, "w") as packed:
-        packed.writestr("a/same one.txt", recording_text(two_parts_and_a_dot()))
-        packed.writestr("b/same one.txt", recording_text(one_part()))
+        for folder in "ab":
+            packed.writestr(f"{folder}/same one.txt", recording_text(one_part()))
     first, second = f"{archive}:a/same one.txt", f"{archive}:b/same one.txt"
     options = ["--robot", "127.0.0.1", "--out", str(out), "--size", "25", "--plane", "horizontal"]
     assert cli.run(["draw", second, *options, "--save", str(saved), "--dry-run"]) == 0
@@ -39,15 +45,10 @@ def test_drawings_become_recordings_tables_and_a_page_with_a_section_each(robot,
     assert cli.run(["draw", first, second, *options]) == 0
     assert robot.at_rest
     recordings = {"same_one_r1.mcap", "same_one_2_r1.mcap"}
-    assert {path.name for path in out.iterdir()} == {
-        *recordings,
-        "draw.json",
-        "draw.md",
-        "report.html",
-        "figures",
-    }
+    written = {path.name for path in out.iterdir()}
+    assert written == {*recordings, "draw.json", "draw.md", "report.html", "figures"}
     said = capsys.readouterr().out
-    assert "same_one: 3 marks" in said
+    assert "same_one: 1 marks" in said
     assert "report.html" in said
     drawings = json.loads((out / "draw.json").read_text())["drawings"]
     assert [one["name"] for one in drawings] == ["same_one", "same_one_2"]
@@ -55,7 +56,7 @@ def test_drawings_become_recordings_tables_and_a_page_with_a_section_each(robot,
     page = (out / "report.html").read_text()
     check_needs_nothing(page)
     assert all(f'<section id="{one["name"]}">' in page for one in drawings)
-    assert page.count('<img src="data:image/svg+xml') == 6
+    assert page.count('<img src="data:image/svg+xml') == 2
     assert str(tmp_path) not in page
     assert "executed" in (out / "draw.md").read_text()
     recording = load_recording(out / "same_one_2_r1.mcap")
@@ -105,7 +106,6 @@ def test_what_cannot_be_drawn_is_one_line_and_moves_nothing(robot, name, content
 
 
 def test_a_drawing_is_placed_in_the_box_of_the_arm_that_answers(robot, file, tmp_path, monkeypatch):
-    file.write_text(recording_text(one_part()))
     drawings = []
 
     def stop(movements, *_):

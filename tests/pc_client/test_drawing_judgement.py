@@ -66,10 +66,13 @@ def test_a_perfect_arm_gives_the_plan_itself(drawing):
         np.testing.assert_allclose(np.diff(part.frame_t), step, atol=1e-9)
         assert len(part.frame_t) >= math.floor((own.t[-1] - own.t[0]) / step)
         np.testing.assert_allclose(part.frame_p, drawing.planned(part.frame_t, mark).p, atol=1e-8)
-    verdict = judge(drawing, [execution]).runs[0]
+    whole = judge(drawing, [execution])
+    verdict = whole.runs[0]
     assert verdict.planned.snr_v_db > 120.0
     assert verdict.planned.snr_t_db > 120.0
     assert verdict.max_error < 1e-9
+    assert verdict.human.snr_v_db == pytest.approx(whole.plan.snr_v_db, abs=2.0)  # as near as the plan is
+    assert verdict.human.snr_t_db == pytest.approx(whole.plan.snr_t_db, abs=2.0)
 
 
 def test_times_map_back_exactly(drawing):
@@ -92,8 +95,11 @@ def test_the_plan_reconstructs_the_person_as_well_as_the_strokes_do(drawing):
 
 def test_a_delay_and_an_offset_count_until_they_are_named(drawing):
     perfect = judge(drawing, [executed(drawing, run_of(drawing))]).runs[0]
-    run = run_of(drawing, late=0.02, offset=(0.001, 0.0, -0.002))
-    verdict = judge(drawing, [executed(drawing, run)]).runs[0]
+    offset = (0.001, 0.0, -0.002)
+    moved = judge(drawing, [executed(drawing, run_of(drawing, offset=offset))]).runs[0]
+    assert moved.planned.snr_v_db > 100.0  # an offset alone does not touch the velocity
+    assert moved.planned.snr_t_db < 40.0
+    verdict = judge(drawing, [executed(drawing, run_of(drawing, late=0.02, offset=offset))]).runs[0]
     assert verdict.planned.snr_v_db < 30.0
     assert verdict.planned.snr_t_db < 40.0
     assert verdict.planned_aligned.snr_v_db > 60.0
@@ -101,13 +107,6 @@ def test_a_delay_and_an_offset_count_until_they_are_named(drawing):
     assert verdict.offset == pytest.approx(math.hypot(0.001, 0.002), rel=1e-3)
     assert verdict.off_sheet == pytest.approx(0.003 * math.sqrt(0.5), rel=0.1)
     assert verdict.human_aligned.snr_v_db == pytest.approx(perfect.human.snr_v_db, abs=1.5)
-
-
-def test_an_offset_alone_does_not_touch_the_velocity(drawing):
-    run = run_of(drawing, offset=(0.0, 0.002, 0.0))
-    verdict = judge(drawing, [executed(drawing, run)]).runs[0]
-    assert verdict.planned.snr_v_db > 100.0
-    assert verdict.planned.snr_t_db < 40.0
 
 
 def test_a_run_that_ended_early_is_refused(drawing):
@@ -121,14 +120,12 @@ def entry(drawing):
     return Entry(drawing, executions, judge(drawing, executions))
 
 
-def test_pictures_are_svg_and_say_that_the_arm_is_simulated(entry):
-    sheets = figures_of(Shown(entry.drawing, entry.executions[0]))
-    assert list(sheets) == list(FIGURES)
-    for sheet in sheets.values():
-        text = svg_text(sheet)
-        assert ET.fromstring(text).tag.endswith("svg")
-        assert "SIMULATED" in text
-        assert svg_text(sheet) == text
+def test_pictures_are_svg_and_the_same_each_time(entry):
+    paths = figures_of(Shown(entry.drawing, entry.executions[0]))["paths"]
+    text = svg_text(paths)
+    assert ET.fromstring(text).tag.endswith("svg")
+    assert "SIMULATED" in text
+    assert svg_text(paths) == text
 
 
 def test_what_is_drawn_lies_on_the_page_and_dots_are_drawn(entry):
@@ -144,6 +141,7 @@ def test_what_is_drawn_lies_on_the_page_and_dots_are_drawn(entry):
 def test_the_page_needs_no_network_and_holds_every_figure(entry):
     sheets = {"sample": figures_of(Shown(entry.drawing, entry.executions[0]))}
     page = render_page([entry], sheets)
+    assert list(sheets["sample"]) == list(FIGURES)
     assert page.count('<img src="data:image/svg+xml') == len(FIGURES)
     check_needs_nothing(page)
     assert "SIMULATED" in page
@@ -162,5 +160,6 @@ def test_the_tables_agree(entry):
     markdown = drawings_markdown([entry])
     assert f"{entry.verdict.runs[0].human.snr_v_db:.2f}" in markdown
     assert f"{entry.drawing.factor:.3f} times" in markdown
+    assert "- remark 1: a gap" in markdown
     twice = 2 * entry.executions
     assert "executed r1" in drawings_markdown([Entry(entry.drawing, twice, judge(entry.drawing, twice))])

@@ -27,6 +27,12 @@ def fail(words):
     raise ClientError(words)
 
 
+def check_jobs_and_errors(executor):
+    assert [executor.submit(square, x).result() for x in range(3)] == [0, 1, 4]
+    with pytest.raises(ClientError, match="what went wrong"):
+        executor.submit(fail, "what went wrong").result()
+
+
 def environment_and_interrupts():
     return os.environ["OMP_NUM_THREADS"], signal.getsignal(signal.SIGINT) == signal.SIG_IGN, os.getpid()
 
@@ -47,24 +53,16 @@ def listener():
 @pytest.fixture
 def cluster():
     distributed = pytest.importorskip("distributed")
-    with distributed.LocalCluster(
-        n_workers=1,
-        threads_per_worker=1,
-        processes=False,
-        dashboard_address=":0",
-        protocol="tcp",
-        host="127.0.0.1",
-    ) as cluster:
+    here = {"processes": False, "dashboard_address": ":0", "protocol": "tcp", "host": "127.0.0.1"}
+    with distributed.LocalCluster(n_workers=1, threads_per_worker=1, **here) as cluster:
         yield cluster.scheduler_address
 
 
 def test_processes_do_jobs_and_hand_over_errors(monkeypatch):
     monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
     handler = signal.getsignal(signal.SIGINT)
-    with open_executor(2, None) as executor:
-        assert list(executor.map(square, range(5))) == [0, 1, 4, 9, 16]
-        with pytest.raises(ClientError, match="what went wrong"):
-            executor.submit(fail, "what went wrong").result()
+    with open_executor(1, None) as executor:
+        check_jobs_and_errors(executor)
         threads, ignored, pid = executor.submit(environment_and_interrupts).result()
     assert threads == "1"
     assert ignored
@@ -76,9 +74,7 @@ def test_processes_do_jobs_and_hand_over_errors(monkeypatch):
 
 def test_dask_does_the_same(cluster):
     with open_executor(None, cluster) as executor:
-        assert [executor.submit(square, x).result() for x in range(5)] == [0, 1, 4, 9, 16]
-        with pytest.raises(ClientError, match="what went wrong"):
-            executor.submit(fail, "what went wrong").result()
+        check_jobs_and_errors(executor)
 
 
 def interrupted_work(listener, futures):

@@ -9,7 +9,7 @@ import csv
 import io
 import json
 import zipfile
-from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager
 
 import numpy as np
@@ -19,8 +19,9 @@ from matplotlib.image import imread
 
 import pc_client.studies.executors as executors
 import pc_client.studies.extraction.batch as batch
+import pc_client.studies.extraction.figures as extraction_figures
 from pc_client import cli
-from pc_client.errors import ClientError, RecordingError
+from pc_client.errors import ClientError
 from pc_client.movements.lognormal import Lognormal
 from pc_client.movements.sigma_lognormal import SigmaLognormal, Stroke
 from pc_client.results.tables import frame_of, to_csv
@@ -41,15 +42,15 @@ from pc_client.studies.extraction.pen import PenPart, PenRecording, pen_sources
 class AtOnce(Executor):
     """Does each job when it is submitted; from `broken_from` on, its workers are dead."""
 
-    def __init__(self, broken_from=None):
-        self.jobs, self.broken_from = [], broken_from
+    def __init__(self, broken_from=99):
+        self.events, self.broken_from = [], broken_from
 
     def submit(self, function, *arguments):
-        self.jobs.append(arguments)
+        self.events.append("job")
         future = Future()
         try:
-            if self.broken_from is not None and len(self.jobs) > self.broken_from:
-                raise batch.BrokenExecutor("out of memory")
+            if self.events.count("job") > self.broken_from:
+                raise BrokenExecutor("out of memory")
             future.set_result(function(*arguments))
         except Exception as error:
             future.set_exception(error)
@@ -58,10 +59,8 @@ class AtOnce(Executor):
 
 def write(path, trajectory, dim=2):
     (part,) = recorded(trajectory, dim).parts
-    rows = "".join(
-        ",".join(map(repr, [t, *p])) + "\n" for t, p in zip(part.t.tolist(), part.p.tolist(), strict=True)
-    )
-    path.write_text(("t,x,y\n" if dim == 2 else "t,x,y,z\n") + rows)
+    header = ",".join("txyz"[: dim + 1])
+    np.savetxt(path, np.column_stack((part.t, part.p)), "%.17g", ",", header=header, comments="")
 
 
 @pytest.fixture(scope="module")
@@ -76,43 +75,32 @@ def folder(tmp_path_factory):
     return path
 
 
+FIGURES = ("file", "snr_v_db", "snr_t_db", "raw_snr_v_db", "raw_snr_t_db", "n_strokes", "n_speed_peaks")
+
+
 def row(*values):
-    return dict(zip(("file", "snr_v_db", "snr_t_db", "n_strokes", "n_speed_peaks"), values, strict=True))
+    return dict(zip(FIGURES, values, strict=True))
 
 
-def check(outcomes, folder):
-    assert [outcome.name for outcome in outcomes] == [
-        str(folder / n) for n in ("a.csv", "b.csv", "c.csv", "d.txt", "e.txt")
-    ]
+DOT = (None, None, None, None, 0, 0)
+
+
+def test_every_recording_has_an_outcome_in_its_place(folder):
+    told = []
+    with open_executor(workers=1) as executor:
+        outcomes = extract_many(pen_sources([folder]), executor, on_outcome=told.append)
+    names = [str(folder / name) for name in ("a.csv", "b.csv", "c.csv", "d.txt", "e.txt")]
+    assert [outcome.name for outcome in outcomes] == names
+    assert sorted(outcome.name for outcome in told) == names
     a, b, c, d, e = outcomes
     assert (a.error, c.error, d.error) == (None, None, None)
     assert (a.row["n_strokes"], c.row["n_strokes"]) == (2, 2)
-    assert d.row == row(d.name, None, None, 0, 0)
+    assert d.row == row(d.name, *DOT)
     assert min(a.row["snr_v_db"], c.row["snr_v_db"]) >= 60.0
     assert 'line 2: "nothing" is not a number' in b.error
     assert "no text file" in e.error
     assert (b.row, e.row) == (None, None)
-
-
-def test_one_after_the_other_with_pictures_of_the_first(folder):
-    outcomes = extract_many(pen_sources([folder]), AtOnce(), n_pictures=2)
-    check(outcomes, folder)
-    assert outcomes[0].picture.startswith(b"\x89PNG")
-    assert [outcome.picture for outcome in outcomes[1:]] == [None] * 4
-
-
-def test_in_processes(folder):
-    with open_executor(workers=1) as executor:
-        check(extract_many(pen_sources([folder]), executor), folder)
-
-
-def test_every_outcome_is_reported_once_and_few_jobs_are_in_flight(folder, monkeypatch):
-    monkeypatch.setattr(batch, "_IN_FLIGHT", 2)
-    told = []
-    with ThreadPoolExecutor(2) as executor:
-        outcomes = extract_many(pen_sources([folder]), executor, on_outcome=told.append)
-    check(outcomes, folder)
-    assert sorted(outcome.name for outcome in told) == [outcome.name for outcome in outcomes]
+    assert [outcome.picture for outcome in outcomes] == [None] * 5
 
 
 def test_an_executor_that_breaks_down_is_one_line(folder):
@@ -120,35 +108,41 @@ def test_an_executor_that_breaks_down_is_one_line(folder):
         extract_many(pen_sources([folder]), AtOnce(broken_from=1))
 
 
-def test_a_fault_of_ours_costs_one_recording(folder, monkeypatch):
+@pytest.fixture
+def no_ink(monkeypatch):
+    """Pictures of recordings are drawn at once."""
+    monkeypatch.setattr(extraction_figures, "draw_extraction", lambda extraction: b"PNG")
+
+
+def test_a_fault_of_ours_costs_one_recording_and_few_jobs_are_in_flight(folder, monkeypatch, no_ink):
+    monkeypatch.setattr(batch, "_IN_FLIGHT", 2)
+    executor = AtOnce()
+
     def faulty(recording, options):
         if recording.name.endswith("a.csv"):
             raise ZeroDivisionError("division by zero")
         return extract(recording, options)
 
     monkeypatch.setattr(batch, "extract", faulty)
-    outcomes = extract_many(pen_sources([folder]), AtOnce())
+
+    def tell(outcome):
+        executor.events.append("told")
+
+    outcomes = extract_many(2 * pen_sources([folder]), executor, n_pictures=5, on_outcome=tell)
+    assert "job job job" not in " ".join(executor.events)
     assert "a.csv: the extraction failed (ZeroDivisionError" in outcomes[0].error
     assert outcomes[2].row is not None
-
-
-def test_nothing_to_do_is_said(tmp_path):
-    with pytest.raises(RecordingError, match="in this folder"):
-        extract_many(pen_sources([tmp_path]), AtOnce())
+    assert [outcome.picture for outcome in outcomes] == [None, None, b"PNG", *[None] * 7]
 
 
 def test_json_has_no_nan_and_the_stated_keys():
-    text = to_json([row("a/ä.txt", 20.5, 30.25, 4, 3), row("dot", None, None, 0, 0)])
-    assert json.loads(text) == [
-        {"file": "a/ä.txt", "snr_v_db": 20.5, "snr_t_db": 30.25, "n_strokes": 4, "n_speed_peaks": 3},
-        {"file": "dot", "snr_v_db": None, "snr_t_db": None, "n_strokes": 0, "n_speed_peaks": 0},
-    ]
-    with pytest.raises(ValueError, match="not JSON compliant"):
-        to_json([row("a", float("nan"), 1.0, 1, 1)])
+    rows = [row("a/ä.txt", 20.5, 30.25, 9.5, 25.5, 4, 5), row("dot", *DOT)]
+    assert json.loads(to_json(rows)) == rows
     assert json.loads(to_json([])) == []
-    assert table_of([row("a", 20.0, 1.0, 4, 5), row("dot", None, None, 0, 0)])[
-        "lognormality", "strokes_per_peak"
-    ].rows() == [(5.0, 0.8), (None, None)]
+    with pytest.raises(ValueError, match="not JSON compliant"):
+        to_json([row("a", float("nan"), 1.0, 1.0, 1.0, 1, 1)])
+    derived = table_of(rows)["lognormality", "strokes_per_peak"]
+    assert derived.rows() == [(5.125, 0.8), (None, None)]
 
 
 @pytest.mark.parametrize("dim", [2, 3])
@@ -164,7 +158,7 @@ def test_the_movement_comes_back_from_the_table_of_strokes_alone(dim):
         for row in numbers
     ]
     trajectory = SigmaLognormal(np.array(targets), tuple(strokes), 1.0)
-    part = result.parts[0]
+    (part,) = result.parts
     assert trajectory.evaluate(part.t).p == pytest.approx(part.trajectory.evaluate(part.t).p, abs=1e-12)
     assert trajectory.lengths == pytest.approx([row["length"] for row in numbers])
     assert figures_of(result)["n_strokes"] == 3
@@ -200,27 +194,17 @@ def ink(png):
 
 
 @pytest.mark.parametrize("dim", [2, 3])
-def test_a_recording(dim, caplog):
+def test_the_picture_of_a_recording_shows_what_moves(dim, caplog):
     (part,) = recorded(own_strokes(0, dim, n=2), dim).parts
     dot = PenPart([9.0], [[0.0] * dim])
     assert ink(draw_extraction(extract(PenRecording("folder/own.csv", (part, dot))))) > 0.02
     assert caplog.text == ""  # nothing that matplotlib complains about
 
 
-@pytest.mark.parametrize("n", [0, 1, 40])
-def test_a_batch(n):
-    rows = [
-        {
-            "file": f"{i}.txt",
-            "snr_v_db": 20.0 + i,
-            "snr_t_db": 30.0 + i,
-            "n_strokes": 5 + i,
-            "n_speed_peaks": 6,
-        }
-        for i in range(n)
-    ]
-    empty = ink(draw_overview(table_of([{"file": "dot", "n_strokes": 0, "n_speed_peaks": 0}])))
-    assert (ink(draw_overview(table_of(rows))) > empty + 0.01) is (n > 0)
+def test_the_overview_of_a_batch_shows_what_moves():
+    empty = ink(draw_overview(table_of([row("dot", *DOT)])))
+    one = ink(draw_overview(table_of([row("a.txt", 20.0, 30.0, 9.0, 25.0, 5, 6)])))
+    assert one > empty + 0.01
 
 
 @pytest.fixture
@@ -246,7 +230,7 @@ def test_one_file(here, capsys):
     assert cli.run(["extract", "one.csv", "--out", "out/deep"]) == 0
     (row,) = extracted(here / "out/deep")
     assert (row["file"], row["n_strokes"], row["n_speed_peaks"]) == ("one.csv", 2, 2)
-    assert min(row["snr_v_db"], row["snr_t_db"]) >= 60.0
+    assert min(row["snr_v_db"], row["snr_t_db"], row["raw_snr_v_db"]) >= 60.0
     assert sorted(path.name for path in (here / "out/deep").rglob("*.*")) == [
         "1_one.png", "extraction.json", "overview.png", "strokes.csv",
     ]  # fmt: skip
@@ -263,9 +247,7 @@ def test_broken_files_are_a_line_each_and_the_rest_is_done(here, capsys):
     files = ["bad.txt", "gone.csv", "bad.zip", "one.csv", "dot.txt"]
     assert cli.run(["extract", *files, "--out", "out", "--figures", "none"]) == 1
     assert [row["file"] for row in extracted(here / "out")] == ["one.csv", "dot.txt"]
-    assert extracted(here / "out")[1] == {
-        "file": "dot.txt", "snr_v_db": None, "snr_t_db": None, "n_strokes": 0, "n_speed_peaks": 0,
-    }  # fmt: skip
+    assert extracted(here / "out")[1] == row("dot.txt", *DOT)
     captured = capsys.readouterr()
     lines = captured.err.splitlines()
     named = [line.split(":")[1].strip().partition(",")[0] for line in lines]
@@ -278,13 +260,13 @@ def test_broken_files_are_a_line_each_and_the_rest_is_done(here, capsys):
 def test_nothing_that_can_be_used_still_gives_a_list(here, capsys):
     assert cli.run(["extract", "gone.csv", "--out", "out"]) == 1
     assert extracted(here / "out") == []
-    assert (
-        capsys.readouterr().err
-        == "ur-client: gone.csv: cannot be read (No such file or directory); give a file that exists\n"
-    )
+    why = "gone.csv: cannot be read (No such file or directory); give a file that exists"
+    assert capsys.readouterr().err == f"ur-client: {why}\n"
 
 
-def test_archives_and_folders_and_pictures_that_lie_in_the_folder_whatever_names_an_archive_has(here, capsys):
+def test_archives_and_folders_and_pictures_that_lie_in_the_folder_whatever_names_an_archive_has(
+    here, capsys, no_ink
+):
     inside = ["inside/one.csv", "../../evil.csv", "-a\x1b[2J.csv"]
     with zipfile.ZipFile(here / "all.zip", "w") as archive:
         for name in inside:

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
 from extraction_samples import own_strokes, recorded
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.special import ndtr
 
@@ -33,34 +32,41 @@ def numbers(trajectory):
     return np.array(rows)
 
 
-@pytest.mark.parametrize("dim", [2, 3])
-@pytest.mark.parametrize("seed", [0, 1, 2, 3])
-def test_own_strokes_come_back(dim, seed):
+def check_own(result, trajectory):
+    """The strokes of an extraction are those of the movement."""
+    assert numbers(result.parts[0].trajectory) == pytest.approx(numbers(trajectory), abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("seed", "dim", "rate"), [(0, 2, 200.0), (1, 3, 200.0), (4, 2, 60.0), (4, 2, 1000.0)]
+)
+def test_own_strokes_come_back_at_any_rate(seed, dim, rate):
     trajectory = own_strokes(seed, dim)
-    result = extract(recorded(trajectory, dim))
+    result = extract(recorded(trajectory, dim, rate=rate))
     assert (result.n_strokes, result.n_speed_peaks) == (5, 5)
     assert result.snr_v_db >= 60.0
     assert result.snr_t_db >= 60.0
-    assert numbers(result.parts[0].trajectory) == pytest.approx(numbers(trajectory), abs=1e-3)
+    check_own(result, trajectory)
     assert result.lognormality == pytest.approx(result.snr_v_db / 5)
 
 
-@pytest.mark.parametrize("rate", [60.0, 133.0, 1000.0])
-def test_own_strokes_come_back_at_any_rate(rate):
-    trajectory = own_strokes(4, 2)
-    result = extract(recorded(trajectory, 2, rate=rate))
-    assert numbers(result.parts[0].trajectory) == pytest.approx(numbers(trajectory), abs=1e-3)
+def test_strokes_that_are_added_between_the_peaks_come_back_as_clean():
+    trajectory = own_strokes(8, 2, n=3, overlap=0.6)
+    result = extract(recorded(trajectory, 2))
+    assert result.snr_v_db >= 100.0  # judged through the low-pass
+    check_own(result, trajectory)
 
 
-@pytest.mark.parametrize("stroke_time", [0.25, 0.3, 0.35, 0.5])
+@pytest.mark.parametrize("stroke_time", [0.25, 0.35])
 def test_strokes_as_fast_as_handwriting_come_back_though_the_low_pass_blunts_them(stroke_time):
     trajectory = own_strokes(102, 2, stroke_time=stroke_time)
     result = extract(recorded(trajectory, 2))
-    assert numbers(result.parts[0].trajectory) == pytest.approx(numbers(trajectory), abs=1e-3)
+    check_own(result, trajectory)
     # Judged through the same low-pass; without it the blunted speed profiles would stand against sharp ones.
     part = result.parts[0]
     sharp = part.trajectory.evaluate(part.t).v[:, :2]
     assert result.snr_v_db > 60.0 > 10.0 * math.log10(np.sum(part.v**2) / np.sum((part.v - sharp) ** 2))
+    assert result.raw_snr_v_db > 60.0  # the recording is as sharp as the strokes
 
 
 def test_own_strokes_come_back_from_an_irregular_clock():
@@ -69,18 +75,18 @@ def test_own_strokes_come_back_from_an_irregular_clock():
     t = np.arange(-0.3, trajectory.duration + 0.3, 0.01)
     t[1:-1] += rng.uniform(-0.003, 0.003, len(t) - 2)
     result = extract(PenRecording("irregular", (PenPart(t, trajectory.evaluate(t).p[:, :2]),)))
-    assert numbers(result.parts[0].trajectory) == pytest.approx(numbers(trajectory), abs=1e-3)
+    check_own(result, trajectory)
     assert result.snr_v_db >= 60.0
 
 
 @pytest.mark.parametrize("dim", [2, 3])
-@pytest.mark.parametrize("seed", [0, 1])
-def test_one_per_cent_of_noise_is_borne(dim, seed):
-    trajectory = own_strokes(seed, dim)
-    recording = recorded(trajectory, dim, noise=0.01, seed=seed)
-    result = extract(recording)
+def test_one_per_cent_of_noise_is_borne_and_stands_in_the_raw_figures(dim):
+    trajectory = own_strokes(1, dim)
+    result = extract(recorded(trajectory, dim, noise=0.01, seed=1))
     assert result.snr_v_db >= 35.0
     assert result.snr_t_db >= 40.0
+    assert result.raw_snr_v_db == pytest.approx(40.0, abs=1.5)
+    assert result.raw_snr_t_db >= 40.0
     t = result.parts[0].t
     truth, ours = trajectory.evaluate(t).v, result.parts[0].trajectory.evaluate(t).v
     assert 10.0 * math.log10(np.sum(truth**2) / np.sum((truth - ours) ** 2)) >= 35.0
@@ -88,18 +94,16 @@ def test_one_per_cent_of_noise_is_borne(dim, seed):
 
 def test_case_e_of_the_notes_comes_back():
     """D=.2, t0=.1, mu=-1.6, sigma=.25, theta .3 -> 1.5: end point (.116996, .147433)."""
-    lognormal = Lognormal(0.1, -1.6, 0.25)
     t = np.arange(0.0, 1.2, 0.005)
-    done = lognormal.evaluate(t).done
+    done = Lognormal(0.1, -1.6, 0.25).evaluate(t).done
     chord = 0.2 * done * np.sinc(0.6 * done / math.pi)
     p = chord[:, None] * np.column_stack((np.cos(0.3 + 0.6 * done), np.sin(0.3 + 0.6 * done)))
     trajectory = extract(PenRecording("case E", (PenPart(t, p),))).parts[0].trajectory
-    assert len(trajectory.strokes) == 1
-    found = trajectory.strokes[0].timing.lognormal
-    assert (found.t0, found.mu, found.sigma) == pytest.approx((0.1, -1.6, 0.25), abs=1e-3)
+    assert numbers(trajectory) == pytest.approx(
+        np.array([[0.1, -1.6, 0.25, 0.0, 0.0, 1.2, 0.00116996, 0.00147433, 0.0]]), abs=1e-3
+    )
     assert trajectory.lengths[0] == pytest.approx(0.2, abs=2e-4)
     assert trajectory.target_points[1, :2] == pytest.approx([0.116996, 0.147433], abs=1e-4)
-    assert numbers(trajectory)[0, 5] == pytest.approx(1.2, abs=1e-3)
 
 
 def hand(seed=3):
@@ -112,26 +116,34 @@ def hand(seed=3):
     return on_one_axis("hand", [part])
 
 
+def decibels(signal, error):
+    return 10.0 * math.log10(np.sum(signal**2) / np.sum(error**2))
+
+
 def test_the_figures_are_those_of_the_trajectory_that_is_given():
-    result = extract(hand())
+    recording = hand()
+    result = extract(recording)
     (part,) = result.parts
     motion = part.trajectory.evaluate(part.t)
-    error = part.v - motion.v[:, :2]
-    assert result.snr_v_db == pytest.approx(10 * math.log10(np.sum(part.v**2) / np.sum(error**2)), abs=1e-3)
-    assert result.snr_t_db == pytest.approx(
-        10
-        * math.log10(np.sum((part.p - part.p.mean(axis=0)) ** 2) / np.sum((part.p - motion.p[:, :2]) ** 2)),
-        abs=1e-3,
-    )
+    assert result.snr_v_db == pytest.approx(decibels(part.v, part.v - motion.v[:, :2]), abs=1e-3)
+    moved = part.p - part.p.mean(axis=0)
+    assert result.snr_t_db == pytest.approx(decibels(moved, part.p - motion.p[:, :2]), abs=1e-3)
     assert part.v == pytest.approx(np.gradient(part.p, part.t, axis=0), abs=0.05 * np.abs(part.v).max())
     assert (part.snr_v_db, part.n_strokes) == (result.snr_v_db, result.n_strokes)
+    (pen,) = recording.parts
+    left = pen.p - part.trajectory.evaluate(pen.t).p[:, :2]
+    assert result.raw_snr_t_db == pytest.approx(decibels(pen.p - pen.p.mean(axis=0), left), abs=1e-3)
+    each = np.sqrt(np.diff(pen.t))[:, None]
+    expected = decibels(np.diff(pen.p, axis=0) / each, np.diff(left, axis=0) / each)
+    assert result.raw_snr_v_db == pytest.approx(expected, abs=1e-3)
 
 
-@pytest.mark.parametrize("ratio", [0.5, 1.0, 1.2, 2.0])
-def test_the_budget_of_strokes_is_kept(ratio):
-    result = extract(hand(), ExtractOptions(strokes_per_peak=ratio))
+@pytest.mark.parametrize("ratio", [0.5, 1.5])
+def test_the_budget_of_strokes_is_kept_and_more_strokes_reconstruct_more(ratio):
+    one, result = (extract(hand(), ExtractOptions(strokes_per_peak=each)) for each in (1.0, ratio))
     # The fit begins with one stroke for each speed peak; the budget is for what is added.
     assert result.n_strokes <= max(ratio, 1.0) * result.n_speed_peaks
+    assert (result.n_strokes > one.n_strokes) is (result.snr_v_db > one.snr_v_db + 0.5) is (ratio > 1.0)
 
 
 def cut_off_at_both_ends():
@@ -154,23 +166,17 @@ def test_a_budget_by_hand_is_strict():
     assert not result.remarks
 
 
-def test_more_strokes_reconstruct_more():
-    few, many = (extract(hand(), ExtractOptions(strokes_per_peak=ratio)) for ratio in (1.0, 1.5))
-    assert many.n_strokes > few.n_strokes
-    assert many.snr_v_db > few.snr_v_db + 0.5
-
-
-def test_no_stroke_is_degenerate():
+@pytest.mark.parametrize("seed", [0, 2])
+def test_no_stroke_is_degenerate(seed):
     bounds = Bounds()
-    for seed in range(3):
-        for part in extract(hand(seed)).parts:
-            for stroke in part.trajectory.strokes:
-                lognormal = stroke.timing.lognormal
-                assert bounds.sigma[0] - 1e-12 <= lognormal.sigma <= bounds.sigma[1] + 1e-12
-                assert math.exp(lognormal.mu) * lognormal.sigma >= bounds.width[0] - 1e-12
-                assert abs(stroke.arc_angle) <= bounds.arc_angle[1]
-            # No pair of strokes that grew against each other.
-            assert part.trajectory.stroke_speeds(part.t).max() < 3.0 * np.linalg.norm(part.v, axis=1).max()
+    (part,) = extract(hand(seed)).parts
+    for stroke in part.trajectory.strokes:
+        lognormal = stroke.timing.lognormal
+        assert bounds.sigma[0] - 1e-12 <= lognormal.sigma <= bounds.sigma[1] + 1e-12
+        assert math.exp(lognormal.mu) * lognormal.sigma >= bounds.width[0] - 1e-12
+        assert abs(stroke.arc_angle) <= bounds.arc_angle[1]
+    # No pair of strokes that grew against each other.
+    assert part.trajectory.stroke_speeds(part.t).max() < 3.0 * np.linalg.norm(part.v, axis=1).max()
 
 
 def test_a_gaussian_profile_is_held_at_the_least_sigma_and_reported():
@@ -184,23 +190,13 @@ def test_a_gaussian_profile_is_held_at_the_least_sigma_and_reported():
 
 def test_neither_place_nor_size_nor_direction_nor_unit_matters():
     plain = hand()
-    rotation = np.array([[math.cos(0.7), -math.sin(0.7)], [math.sin(0.7), math.cos(0.7)]])
-    moved = PenRecording(
-        "moved", tuple(PenPart(part.t, 1e-3 * part.p @ rotation.T + [500.0, -20.0]) for part in plain.parts)
-    )
-    one, other = extract(plain), extract(moved)
+    (part,) = plain.parts
+    turned = 1e-3 * part.p @ np.array([[0.8, -0.6], [0.6, 0.8]]) + [500.0, -20.0]
+    one, other = extract(plain), extract(PenRecording("moved", (PenPart(part.t, turned),)))
     assert other.n_strokes == one.n_strokes
     assert other.snr_v_db == pytest.approx(one.snr_v_db, abs=0.2)
     assert other.parts[0].trajectory.lengths.sum() == pytest.approx(
         1e-3 * one.parts[0].trajectory.lengths.sum(), rel=0.1
-    )
-
-
-def test_slowed_down_movements_have_the_same_strokes_slowed_down():
-    trajectory = own_strokes(6, 2)
-    slow = extract(recorded(trajectory.stretched(3.0), 2)).parts[0].trajectory
-    assert [s.timing.lognormal.sigma for s in slow.strokes] == pytest.approx(
-        [s.timing.lognormal.sigma for s in trajectory.strokes], abs=1e-3
     )
 
 
@@ -211,8 +207,6 @@ def test_parts_share_a_time_axis_and_a_budget():
     result = extract(PenRecording("two", (first, later, dot)))
     assert [part.t[0] for part in result.parts] == [first.t[0], later.t[0]]
     assert result.still == (dot,)
-    assert result.n_strokes == sum(part.n_strokes for part in result.parts)
-    assert result.n_speed_peaks == sum(part.n_speed_peaks for part in result.parts)
     for part in result.parts:
         modes = [stroke.timing.lognormal.mode for stroke in part.trajectory.strokes]
         assert part.t[0] - 1.0 < min(modes)
@@ -221,39 +215,37 @@ def test_parts_share_a_time_axis_and_a_budget():
 
 
 @pytest.mark.parametrize(
-    "recording",
+    ("t", "p"),
     [
-        PenRecording("nothing", ()),
-        PenRecording("a sample", (PenPart([0.0], [[1.0, 2.0]]),)),
-        PenRecording("a dot", (PenPart([0.0, 0.2, 0.3], [[1.0, 2.0]] * 3),)),
-        PenRecording("a touch", (PenPart([0.0, 0.01], [[1.0, 2.0], [1.0, 3.0]]),)),
+        ([], None),
+        ([0.0], [[1.0, 2.0]]),
+        ([0.0, 0.2], [[1.0, 2.0]] * 2),
+        ([0.0, 0.01], [[1.0, 2.0], [1.0, 3.0]]),
     ],
-    ids=lambda recording: recording.name,
+    ids=["nothing", "a sample", "a dot", "a touch"],
 )
-def test_where_nothing_moves_there_is_no_stroke_and_no_snr(recording):
-    result = extract(recording)
+def test_where_nothing_moves_there_is_no_stroke_and_no_snr(t, p):
+    parts = (PenPart(t, p),) if t else ()
+    result = extract(PenRecording("still", parts))
     assert (result.parts, result.snr_v_db, result.snr_t_db, result.lognormality) == ((), None, None, None)
+    assert (result.raw_snr_v_db, result.raw_snr_t_db) == (None, None)
     assert (result.n_strokes, result.n_speed_peaks) == (0, 0)
-    assert result.still == recording.parts
+    assert result.still == parts
 
 
 @pytest.mark.parametrize("dim", [2, 3])
-@pytest.mark.parametrize("n", [2, 3, 4, 5, 7])
-@pytest.mark.parametrize("duration", [0.02, 0.05, 0.2, 1.0])
+@pytest.mark.parametrize(("n", "duration"), [(2, 0.02), (3, 0.05), (5, 0.2), (7, 1.0)])
 def test_short_parts_have_a_stroke(n, duration, dim):
-    t = np.linspace(0.0, duration, n)
     p = np.column_stack([(np.arange(n) + axis) ** 2 for axis in range(dim)]).astype(float)
-    result = extract(PenRecording("short", (PenPart(t, p),)))
+    result = extract(PenRecording("short", (PenPart(np.linspace(0.0, duration, n), p),)))
     assert result.n_strokes >= 1
     assert result.snr_v_db > 5.0
 
 
 @pytest.mark.parametrize("dim", [2, 3])
-@pytest.mark.parametrize("x", [[0, 1, 0], [0, 1, 0, -1, 0], [0, 0, 0, 1e-4, 0, 0, 0], [5, 5, 5, 6, 6, 6]])
-def test_there_and_back_again_has_a_stroke_with_a_chord(x, dim):
-    t = np.linspace(0.0, 0.1 * len(x), len(x))
-    p = np.zeros((len(x), dim))
-    p[:, 0] = x
+def test_there_and_back_again_has_a_stroke_with_a_chord(dim):
+    t = np.linspace(0.0, 0.5, 5)
+    p = np.eye(1, dim) * [[0.0], [1.0], [0.0], [-1.0], [0.0]]
     result = extract(PenRecording("back", (PenPart(t, p),)))
     assert result.n_strokes >= 1
     assert math.isfinite(result.snr_v_db)
@@ -267,31 +259,20 @@ rows = st.lists(
         st.one_of(st.floats(-1e6, 1e6), st.sampled_from([math.nan, math.inf, 0.0])),
     ),
     min_size=1,
-    max_size=20,
+    max_size=12,
 )
 
 
 @given(rows, st.sampled_from([1e-3, 1e-2]))
-@settings(max_examples=20)
 def test_no_samples_whatever_make_it_fail(rows, unit):
     t, x, y = np.array(rows, dtype=float).T
     part, _ = ordered_part(np.nancumsum(t) * unit, np.column_stack((x, y)))
-    result = extract(
-        on_one_axis("any", [] if part is None else [part]), ExtractOptions(fit=FitOptions(1, 3, 4))
-    )
+    recording = on_one_axis("any", [] if part is None else [part])
+    result = extract(recording, ExtractOptions(fit=FitOptions(1, 3, 4)))
     if result.parts:
-        assert math.isfinite(result.snr_v_db)
-        assert math.isfinite(result.snr_t_db)
+        ratios = (result.snr_v_db, result.snr_t_db, result.raw_snr_v_db, result.raw_snr_t_db)
+        assert all(map(math.isfinite, ratios))
         assert all(np.isfinite(part.trajectory.evaluate(part.t).p).all() for part in result.parts)
-
-
-def test_a_long_recording_costs_memory_in_proportion_to_its_length():
-    """A minute of movement: the equations are a band, never a square."""
-    trajectory = own_strokes(7, 2, n=60, stroke_time=1.5, overlap=0.4)
-    options = ExtractOptions(fit=replace(FitOptions(), rounds=1, iterations=3, last_iterations=4))
-    result = extract(recorded(trajectory, 2), options)
-    assert result.parts[0].t[-1] > 50.0
-    assert result.snr_v_db > 30.0
 
 
 @pytest.mark.parametrize("dim", [2, 3])

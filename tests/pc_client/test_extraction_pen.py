@@ -17,7 +17,7 @@ from pc_client.studies.extraction.pen import (
     ordered_part,
     parse_pen,
     pen_sources,
-    read_pen,
+    read_recording,
 )
 
 OMNIGLOT = "START\n10.5,-20.25,0\n11.5,-21.25,9\n12.5,-22.25,20\nBREAK\n30,-40,400\n31,-40,410\nBREAK\n"
@@ -46,14 +46,12 @@ ROWS = [(1.0, 2.0, 3.0, 0.010), (1.5, 2.5, 3.5, 0.018), (2.0, 3.0, 4.0, 0.026)]
 
 
 @pytest.mark.parametrize(
-    ("header", "order"),
+    ("header", "order", "separator"),
     [
-        ("t,x,y", "txy"), ("x,y,t", "xyt"), ("x,y,z,t", "xyzt"), ("T,X,Y,Z", "txyz"), ("y,t,x", "ytx"),
-        ("time,x,y", "txy"), ("timestamp,x,y,z", "txyz"), ('"t","x","y"', "txy"), ("x [mm],y [mm],t [s]", "xyt"),
-        ("", "xyt"), ("", "xyzt"),
+        ("t,x,y", "txy", ","), ("T,X,Y,Z", "txyz", ", "), ("y,t,x", "ytx", ";"), ("timestamp,x,y,z", "txyz", "\t"),
+        ("x [mm],y [mm],t [s]", "xyt", ","), ('"time","x","y"', "txy", ","), ("", "xyt", ";"), ("", "xyzt", ","),
     ],
 )  # fmt: skip
-@pytest.mark.parametrize("separator", [",", ", ", ";", "\t"])
 def test_columns_by_name_and_by_number(header, order, separator):
     lines = [header.replace(",", separator)] if header else []
     lines += [separator.join(str(row["xyzt".index(axis)]) for axis in order) for row in ROWS]
@@ -73,18 +71,11 @@ def test_blanks_comments_a_byte_order_mark_and_other_columns():
 @pytest.mark.parametrize(
     ("steps", "header", "given", "seconds"),
     [
-        (0.008, "t,x,y", None, 0.008),
-        (8.0, "t,x,y", None, 0.008),
-        (8000.0, "t,x,y", None, 0.008),
-        (8e6, "t,x,y", None, 0.008),
-        (1.0, "t,x,y", None, 0.001),
-        (0.0005, "t,x,y", None, 0.0005),
-        (0.4, "t_ms,x,y", None, 0.0004),
-        (2.0, "time [s],x,y", None, 2.0),
-        (2.0, "t,x,y", "s", 2.0),
-        (0.008, "t_s,x,y", "ms", 8e-6),
+        (0.4, "t,x,y", None, 0.4), (1.0, "t,x,y", None, 0.001), (8.0, "t,x,y", None, 0.008),
+        (8000.0, "t,x,y", None, 0.008), (8e6, "t,x,y", None, 0.008), (0.4, "t_ms,x,y", None, 0.0004),
+        (2.0, "time [sec],x,y", None, 2.0), (2.0, "t,x,y", "s", 2.0), (0.008, "t_s,x,y", "ms", 8e-6),
     ],
-)
+)  # fmt: skip
 def test_the_unit_of_time(steps, header, given, seconds):
     rows = "".join(f"{index * steps},{index},0\n" for index in range(5))
     assert np.diff(only(f"{header}\n{rows}", given).t) == pytest.approx(seconds)
@@ -104,42 +95,36 @@ def test_a_clock_of_this_century_loses_nothing():
     assert part.t == pytest.approx([0.0, 0.008, 0.016], abs=1e-6)
 
 
-def test_repeated_time_stamps_are_merged_by_their_mean():
-    recording = parse("t,x,y\n0,0,0\n.01,1,1\n.01,3,1\n.02,4,2\n")
-    assert recording.parts[0].p.tolist() == [[0.0, 0.0], [2.0, 1.0], [4.0, 2.0]]
-    assert recording.remarks == ("1 sample with a repeated time stamp merged by their mean",)
+@pytest.mark.parametrize(
+    ("rows", "t", "x", "remark"),
+    [
+        ("0,0,0 .01,1,1 .01,3,1 .02,4,2", [0.0, 0.01, 0.02], [0.0, 2.0, 4.0],
+         "1 sample with a repeated time stamp merged by their mean"),
+        ("0,0,0 .01,1,0 .02,2,0 .005,9,9 .015,9,9 .03,3,0", [0.0, 0.01, 0.02, 0.03], [0.0, 1.0, 2.0, 3.0],
+         "2 samples with time running backwards left out"),
+        ("0,0,0 .01,nan,0 ,1,1 .02,inf,1 .03,1,NA .04,4,1", [0.0, 0.04], [0.0, 4.0],
+         "4 samples that are not numbers left out"),
+        ("0,0,0 .01,1,0 .02,1,0 3.5,3,0", [0.0, 0.01, 0.02, 3.5], [0.0, 1.0, 1.0, 3.0],
+         "a gap of 3.48 s bridged by a straight line"),
+    ],
+)  # fmt: skip
+def test_defects_are_mended_with_a_remark(rows, t, x, remark):
+    recording = parse("t,x,y\n" + rows.replace(" ", "\n"))
+    (part,) = recording.parts
+    assert part.t == pytest.approx(t)
+    assert part.p[:, 0].tolist() == x
+    assert recording.remarks == (remark,)
 
 
-def test_time_running_backwards_is_left_out():
-    recording = parse("t,x,y\n0,0,0\n.01,1,0\n.02,2,0\n.005,9,9\n.015,9,9\n.03,3,0\n")
-    assert recording.parts[0].p[:, 0].tolist() == [0.0, 1.0, 2.0, 3.0]
-    assert recording.remarks == ("2 samples with time running backwards left out",)
-
-
-def test_samples_that_are_no_numbers_are_left_out():
-    recording = parse("t,x,y\n0,0,0\n.01,nan,0\n,1,1\n.02,inf,1\n.03,1,NA\n.04,4,1\n")
-    assert recording.parts[0].t == pytest.approx([0.0, 0.04])
-    assert recording.remarks == ("4 samples that are not numbers left out",)
-
-
-def test_empty_parts_are_nothing():
+def test_empty_parts_are_nothing_and_one_sample_is_a_recording():
     assert len(parse("START\nBREAK\nBREAK\n" + OMNIGLOT + "BREAK\nBREAK\n").parts) == 2
+    assert only("x,y,t\n4,5,100\n").t.tolist() == [0.0]
 
 
 def test_parts_whose_clock_starts_again_come_one_after_the_other():
     recording = parse("START\n0,0,0\n1,1,10\n2,2,20\nBREAK\n5,5,0\n6,6,10\nBREAK\n")
     assert recording.parts[1].t == pytest.approx([0.12, 0.13])
     assert "1 of 2 parts began before the last ended" in recording.remarks[0]
-
-
-def test_long_gaps_are_reported():
-    assert parse("t,x,y\n0,0,0\n.01,1,0\n.02,1,0\n3.5,3,0\n").remarks == (
-        "a gap of 3.48 s bridged by a straight line",
-    )
-
-
-def test_one_sample_is_a_recording():
-    assert only("x,y,t\n4,5,100\n").t.tolist() == [0.0]
 
 
 @pytest.mark.parametrize(
@@ -150,12 +135,11 @@ def test_one_sample_is_a_recording():
         (b"x,y,t\n", "no samples"),
         (b"\x89PNG\r\n\x1a\n\0\0", "no text file"),
         (b"hello world\n1,2,3\n", 'line 1: "hello, world" is neither a sample nor a header'),
-        (b"a,b,c\n1,2,3\n", "neither a sample nor a header with x, y and t"),
-        (b"x,t\n1,2\n", "neither a sample nor a header"),
+        (b"x,t\n1,2\n", "neither a sample nor a header with x, y and t"),
         (b"1,2\n3,4\n", "line 1: 2 columns and no header"),
-        (b"1,2,3,4,5\n", "line 1: 5 columns and no header"),
         (b"x,y,t\n1,2,3\n1,2\n", "line 3: 2 columns after lines of 3"),
         (b"x,y,t\n1,2,3\n1,oops,4\n", 'line 3: "oops" is not a number'),
+        (b"x,y,t\n1,2,3\n1,-2e19,4\n", 'line 3: "-2e19" is more than 1e\\+19'),
         (b"x,y,t\nnan,2,3\n1,nan,4\n", "no sample with numbers for all columns"),
         (b"x,y,t_s\n0,0,0\n1,1,1e9\n", "lasts 1e\\+09 s"),
     ],
@@ -169,7 +153,7 @@ def test_what_makes_no_sense_is_one_line_with_the_file_and_the_place(content, wo
 
 def test_a_missing_file(tmp_path):
     with pytest.raises(RecordingError, match=r"nothing\.csv: cannot be read \(No such file"):
-        read_pen(tmp_path / "nothing.csv")
+        read_recording(tmp_path / "nothing.csv")
 
 
 def test_parts_are_checked_when_they_are_made():
@@ -204,16 +188,21 @@ def test_a_folder_is_all_its_recordings(folder):
 
 
 def test_an_archive_is_all_its_recordings_and_a_file_is_itself_whatever_its_name(folder):
-    sources = pen_sources([folder / "all.zip", str(folder / "notes.md")])
-    assert [source.name for source in sources] == ["in/a.csv", "in/b.txt", str(folder / "notes.md")]
-    assert [content for _, content in contents(sources)] == [OMNIGLOT.encode()] * 3
+    sources = pen_sources([folder / "gone.txt", folder / "all.zip", str(folder / "notes.md")])
+    gone, *found = contents(sources)
+    assert [source.name for source, _ in found] == ["in/a.csv", "in/b.txt", str(folder / "notes.md")]
+    assert [content for _, content in found] == [OMNIGLOT.encode()] * 3
+    assert isinstance(gone[1], RecordingError)  # and does not stop the others
 
 
-def test_files_that_cannot_be_read_do_not_stop_the_others(folder):
-    sources = pen_sources([folder / "gone.txt", folder / "b.txt"])
-    (_, first), (_, second) = contents(sources)
-    assert isinstance(first, RecordingError)
-    assert second == OMNIGLOT.encode()
+def test_one_recording_is_named_by_its_file_or_its_place_in_an_archive(folder):
+    for name in ("b.txt", "all.zip:in/a.csv"):
+        assert len(read_recording(folder / name).parts) == 2
+    with pytest.raises(RecordingError, match=r"inside\.txt: cannot be unpacked"):
+        read_recording(folder / "all.zip:inside.txt")
+    for many in (folder, folder / "all.zip"):
+        with pytest.raises(RecordingError, match="holds many recordings"):
+            read_recording(many)
 
 
 def test_archives_that_are_none(folder):

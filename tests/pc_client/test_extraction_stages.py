@@ -11,7 +11,8 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from extraction_samples import own_strokes, recorded
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from pc_client.movements.lognormal import Lognormal
@@ -46,8 +47,16 @@ def wave(frequency, rate=200.0, duration=4.0):
     )
 
 
-@pytest.mark.parametrize("rate", [60.0, 133.0, 200.0, 1000.0])
-@pytest.mark.parametrize(("frequency", "gain"), [(1.0, 1.0), (5.0, 1.0), (CUTOFF_HZ, 0.5), (24.0, 0.004)])
+@pytest.mark.parametrize(
+    ("rate", "frequency", "gain"),
+    [
+        (60.0, 5.0, 1.0),
+        (200.0, CUTOFF_HZ, 0.5),
+        (1000.0, 1.0, 1.0),
+        (1000.0, CUTOFF_HZ, 0.5),
+        (133.0, 24.0, 0.004),
+    ],
+)
 def test_what_passes_and_what_does_not(rate, frequency, gain):
     smooth = smooth_part(wave(frequency, rate))
     middle = slice(len(smooth.t) // 4, -len(smooth.t) // 4)
@@ -80,7 +89,6 @@ def test_times_begin_and_end_with_the_part():
 )
 @example([(1, 0, 0), (10, 0, 0), (28, 0, 1), (11, 0, 0), (39, 0, 0)])
 @example([(1, 0, 0), (46, 0, 0), (12, 0, 1), (24, 0, 0)])
-@settings(max_examples=60)
 def test_no_clock_makes_the_signal_leave_the_path_far(rows):
     """No overshoot of a curve between close time stamps: never more than the size of the path itself; ends stay."""
     steps, x, y = np.array(rows, dtype=float).T
@@ -95,63 +103,39 @@ def test_no_clock_makes_the_signal_leave_the_path_far(rows):
     assert smooth.p[[0, -1]] == pytest.approx(part.p[[0, -1]], abs=1e-6 * size.max())
 
 
-@pytest.mark.parametrize(
-    ("t", "p", "expected"),
-    [
-        ([0.0], [[1.0, 1.0]], False),
-        ([0.0, 0.01], [[0.0, 0.0], [1.0, 1.0]], False),
-        ([0.0, 0.5], [[2.0, 2.0], [2.0, 2.0]], False),
-        ([0.0, 0.05], [[0.0, 0.0], [1.0, 1.0]], True),
-    ],
-)
-def test_what_is_a_movement(t, p, expected):
-    assert moves(PenPart(t, p)) is expected
-
-
 def smooth_sum(*lognormals):
     t = np.arange(0.0, 2.5, 0.005)
-    x = sum(length * lognormal.evaluate(t).done for lognormal, length in lognormals)
+    x = sum(10.0 * lognormal.evaluate(t).done for lognormal in lognormals)
     return smooth_part(PenPart(t, np.column_stack((x, np.zeros_like(x)))))
 
 
 def test_strokes_apart_are_one_peak_one_salient_interval_and_one_stroke_each():
     lognormals = [Lognormal(0.1, -0.9, 0.25), Lognormal(0.8, -0.9, 0.2), Lognormal(1.4, -0.9, 0.3)]
-    smooth = smooth_sum(*((lognormal, 10.0) for lognormal in lognormals))
-    assert smooth.t[speed_peaks(smooth)] == pytest.approx(
-        [lognormal.mode for lognormal in lognormals], abs=0.01
-    )
+    smooth = smooth_sum(*lognormals)
+    assert smooth.t[speed_peaks(smooth)] == pytest.approx([one.mode for one in lognormals], abs=0.01)
     assert len(salient_points(smooth)) == 4
     chain = initial_chain(smooth)
-    assert chain.median == pytest.approx([lognormal.median for lognormal in lognormals], abs=0.03)
-    assert chain.width == pytest.approx(
-        [math.exp(lognormal.mu) * lognormal.sigma for lognormal in lognormals], rel=0.2
-    )
+    assert chain.median == pytest.approx([one.median for one in lognormals], abs=0.03)
+    assert chain.width == pytest.approx([math.exp(one.mu) * one.sigma for one in lognormals], rel=0.2)
     assert chain.targets[:, 0] == pytest.approx([0.0, 10.0, 20.0, 30.0], abs=0.5)
 
 
 def test_a_single_stroke_is_found_by_the_closed_forms_alone():
     lognormal = Lognormal(0.1, -0.5, 0.25)
-    smooth = smooth_sum((lognormal, 10.0))
+    smooth = smooth_sum(lognormal)
     chain = initial_chain(smooth)
-    assert (chain.sigma[0], chain.median[0]) == (
-        pytest.approx(0.25, abs=0.02),
-        pytest.approx(lognormal.median, abs=0.01),
-    )
+    assert chain.sigma == pytest.approx([0.25], abs=0.02)
+    assert chain.median == pytest.approx([lognormal.median], abs=0.01)
     points = characteristic_points(smooth.t, smooth.speed)
-    assert points.times == pytest.approx(
-        (lognormal.inflections.before, lognormal.mode, lognormal.inflections.after), abs=0.01
-    )
+    assert points.times == pytest.approx(points_of(lognormal, 1.0).times, abs=0.01)
 
 
 def test_a_ripple_counts_as_a_peak_only_above_the_stated_prominence():
     t = np.arange(0.0, 2.0, 0.005)
-    for height, peaks in ((0.05, 2), (0.002, 1)):
+    for height, n_peaks in ((0.05, 2), (0.002, 1)):
         speed = np.exp(-0.5 * ((t - 0.6) / 0.1) ** 2) + height * np.exp(-0.5 * ((t - 1.4) / 0.06) ** 2)
-        path_length = np.cumsum(speed) * 0.005
-        assert (
-            len(speed_peaks(smooth_part(PenPart(t, np.column_stack((path_length, 0.0 * path_length))))))
-            == peaks
-        )
+        smooth = smooth_part(PenPart(t, np.cumsum(speed)[:, None] * [0.005, 0.0]))
+        assert len(speed_peaks(smooth)) == n_peaks
 
 
 def test_candidates_are_where_the_residual_is():
@@ -179,12 +163,8 @@ def points_of(lognormal, length):
 def test_any_lognormal_comes_back(t0, mu, sigma, length):
     points = points_of(Lognormal(t0, mu, sigma), length)
     v2, v3, v4 = points.speeds
-    for found in (
-        sigma_from_peak_ratio(v2 / v3),
-        sigma_from_peak_ratio(v4 / v3),
-        sigma_from_slope_ratio(v4 / v2),
-    ):
-        assert found == pytest.approx(sigma, rel=1e-5)
+    found = (sigma_from_peak_ratio(v2 / v3), sigma_from_peak_ratio(v4 / v3), sigma_from_slope_ratio(v4 / v2))
+    assert found == pytest.approx((sigma,) * 3, rel=1e-5)
     lognormal = lognormal_from_points(points, sigma)
     assert lognormal.mu == pytest.approx(mu, abs=1e-6)
     assert lognormal.t0 == pytest.approx(t0, abs=1e-6)
@@ -211,7 +191,7 @@ def chain_of(dim, arc_angles=(0.8, -1.5, 0.0, 1e-5), seed=0):
     )
 
 
-TIMES = np.linspace(-0.2, 1.5, 83)
+TIMES = np.linspace(-0.2, 1.5, 57)
 
 
 @pytest.mark.parametrize("dim", [2, 3])
@@ -226,7 +206,7 @@ def test_a_chain_is_the_movement_of_the_package(dim):
 
 
 @pytest.mark.parametrize("dim", [2, 3])
-@pytest.mark.parametrize("arc_angles", [(0.8, -1.5, 0.3), (1e-5, 0.0, -2e-4), (4.4, -4.4, 0.0011)])
+@pytest.mark.parametrize("arc_angles", [(0.8, 1e-5), (0.0, -4.4, 0.0011)])
 def test_the_jacobian_is_the_derivative(dim, arc_angles):
     chain = chain_of(dim, arc_angles)
     jacobian = linearise(chain, TIMES, 0, len(chain)).jacobian
@@ -261,6 +241,8 @@ def test_inserted_strokes_move_nothing_and_taking_them_out_gives_the_chain_back(
     back = without(longer, np.isin(longer.median, [0.9, 0.31]))
     assert back.targets == pytest.approx(chain.targets)
     assert back.width == pytest.approx(chain.width)
+    shorter = without(chain, np.arange(4) == 3)
+    assert shorter.targets == pytest.approx(chain.targets[[0, 1, 2, 4]])  # the end of the whole is kept
 
 
 def test_strokes_put_in_order_still_make_the_same_movement():
@@ -271,6 +253,13 @@ def test_strokes_put_in_order_still_make_the_same_movement():
     sorted_ = in_order(shuffled)
     assert sorted_.median.tolist() == sorted(chain.median.tolist())
     assert linearise(sorted_, TIMES, 0, 4).p == pytest.approx(linearise(shuffled, TIMES, 0, 4).p, abs=1e-12)
+
+
+def test_first_strokes_in_space_turn_in_planes_through_their_chords():
+    (part,) = recorded(own_strokes(0, 3), 3).parts
+    chain = initial_chain(smooth_part(part))
+    assert np.abs(chain.arc_angle).max() > 0.3
+    assert np.einsum("ij,ij->i", chain.normal, chain.chords) == pytest.approx(np.zeros(5), abs=1e-9)
 
 
 def test_normals_of_chords_they_are_parallel_to_are_still_across():

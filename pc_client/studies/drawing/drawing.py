@@ -2,13 +2,8 @@
 
 The strokes of a recording are extracted, placed in the workspace, joined with lifts between them, and slowed
 down as far as the arm needs it. Strokes of marks and of lifts add up alike, so all stand in one chain of
-target points:
-
-    lowered pen   one stroke from above the start of the first mark
-    mark 1        its own strokes
-    pen-up move   two strokes over a via point above the sheet, to the start of mark 2, overlapping in time
-    mark 2 ...
-    lifted pen    one stroke to above the end of the last mark
+target points: one stroke lowers the pen, each mark has its own strokes, a pen-up move between two marks has
+two that overlap in time, over a via point above the sheet, and one stroke lifts the pen at the end.
 
 Each mark keeps its strokes, shape and timing. Only the gaps between marks may become longer: where a tail
 of a mark's strokes would reach into its neighbour, or where a pen-up move needs more time. Strokes of lifts
@@ -120,11 +115,6 @@ class Drawing:
         return [index for index, mark in enumerate(self.marks) if mark.trajectory is not None]
 
     @property
-    def trajectory(self) -> SigmaLognormal:
-        """The movement's trajectory, in the time of the arm."""
-        return self.joined.trajectory.stretched(self.factor)
-
-    @property
     def delays(self) -> Array:
         """How much later after the first mark each one comes than recorded, (n_marks,), s of the hand."""
         at: Array = self.joined.shifts - self.joined.shifts[0]
@@ -146,9 +136,8 @@ class Drawing:
 
     def planned(self, t: Array, mark: int) -> Motion:
         """The plan at times of the recording that belong to a mark, in its frame, unit and time."""
-        motion = self.joined.trajectory.evaluate(t + self.joined.shifts[mark])
-        back = inverse(self.placement.similarity)
-        return Motion(back.points(motion.p), back.vectors(motion.v), back.vectors(motion.a))
+        plan = self.joined.trajectory.transformed(inverse(self.placement.similarity))
+        return plan.evaluate(t + self.joined.shifts[mark])
 
 
 def make_drawing(
@@ -226,20 +215,18 @@ class Joined:
 
     Attributes:
         trajectory: all strokes; the movement begins at 0 at rest, the pen lifted.
-        gaps: (n_marks + 1,), s: before the first mark, between the marks, after the last.
         shifts: (n_marks,), s: time of the movement less time of the recording, for each mark.
         pen_down: (n_marks, 2), s: when in the movement the pen comes down and goes up.
     """
 
     trajectory: SigmaLognormal
-    gaps: Array
     shifts: Array
     pen_down: Array
 
-    def gap_intervals(self) -> list[tuple[float, float]]:
-        """Start and end (s) of each gap."""
-        edges = [0.0, *self.pen_down.ravel().tolist(), self.trajectory.duration]
-        return list(zip(edges[::2], edges[1::2], strict=True))
+    @property
+    def gaps(self) -> Array:
+        """(n_marks + 1, 2), s: start and end of each gap, before the first mark to after the last."""
+        return np.array([0.0, *self.pen_down.ravel(), self.trajectory.duration]).reshape(-1, 2)
 
 
 def least_gaps(marks: Sequence[Mark], size: float) -> Array:
@@ -247,12 +234,11 @@ def least_gaps(marks: Sequence[Mark], size: float) -> Array:
 
     The marks are in order of time; tails are judged by the size of the drawing, in the unit of the marks.
     """
-    first, last = marks[0], marks[-1]
     between = [
         max(b.begin - a.end, a.lag(TAIL * size), b.lead(TAIL * size), _LEAST_GAP_S)
         for a, b in pairwise(marks)
     ]
-    before, after = first.lead(_REST * size), last.lag(_REST * size)
+    before, after = marks[0].lead(_REST * size), marks[-1].lag(_REST * size)
     return np.array([max(before, _LOWERING_S), *between, max(after, _LOWERING_S)])
 
 
@@ -264,20 +250,16 @@ def join(marks: Sequence[Mark], gaps: Array, lift: Array) -> Joined:
         gaps: (n_marks + 1,), s.
         lift: from the sheet to the lifted pen, (3,), m.
     """
-    downs = np.empty((len(marks), 2))
-    now = 0.0
-    for row, (gap, mark) in enumerate(zip(gaps[:-1], marks, strict=True)):
-        downs[row] = now + gap, now + gap + mark.end - mark.begin
-        now = float(downs[row, 1])
-    shifts = downs[:, 0] - np.array([mark.begin for mark in marks])
-
+    begins, ends = np.array([(mark.begin, mark.end) for mark in marks]).T
+    ups = np.cumsum(gaps[:-1] + ends - begins)
+    shifts = ups - ends
     targets, strokes = [marks[0].first + lift], [_lift_stroke(0.0, float(gaps[0]))]
     for row, mark in enumerate(marks):
         targets.append(mark.first)
         if mark.trajectory is not None:
             targets += list(mark.trajectory.target_points[1:])
             strokes += [stroke.later(float(shifts[row])) for stroke in mark.trajectory.strokes]
-        up, gap = float(downs[row, 1]), float(gaps[row + 1])
+        up, gap = float(ups[row]), float(gaps[row + 1])
         if row + 1 < len(marks):
             targets.append(0.5 * (mark.last + marks[row + 1].first) + lift / _pen_up_height())
             share = _PEN_UP_SHARE * gap
@@ -285,8 +267,8 @@ def join(marks: Sequence[Mark], gaps: Array, lift: Array) -> Joined:
         else:
             targets.append(mark.last + lift)
             strokes.append(_lift_stroke(up, gap))
-    trajectory = SigmaLognormal(np.array(targets), tuple(strokes), now + float(gaps[-1]))
-    return Joined(trajectory, read_only(gaps), read_only(shifts), read_only(downs))
+    trajectory = SigmaLognormal(np.array(targets), tuple(strokes), float(ups[-1] + gaps[-1]))
+    return Joined(trajectory, read_only(shifts), read_only(np.column_stack((begins + shifts, ups))))
 
 
 def _lift_stroke(start: float, duration: float) -> Stroke:
@@ -354,9 +336,7 @@ def _paced(
     for _ in range(_ATTEMPTS):
         joined = join(marks, gaps, lift)
         t, need = factor_needed(name, joined, arm)
-        worst = np.array(
-            [need[(t >= begin) & (t <= end)].max(initial=0.0) for begin, end in joined.gap_intervals()]
-        )
+        worst = np.array([need[(t >= start) & (t <= end)].max(initial=0.0) for start, end in joined.gaps])
         late = (worst > allowed * (1.0 + ACCURACY)) & (gaps < _WIDE_GAP_S)
         if not late.any():
             break

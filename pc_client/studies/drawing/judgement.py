@@ -7,13 +7,9 @@ the recording, low-passed, for everything that is differentiated. That low-pass 
 noise: its cut-off is twice that of the recording's low-pass, which would flatten the speed profiles a second
 time.
 
-    SNR_v  10 log10( sum |v|^2 / sum |v - v'|^2 )              velocity vectors
-    SNR_t  10 log10( sum |p - mean p|^2 / sum |p - p'|^2 )     positions, mean p of each part by itself
-
-both over all parts that move, while the pen is down. What is compared with the arm is taken at the arm's own
-time stamps, all signals through the same first difference, neither shifted nor smoothed.
-
-Source: docs/extraction.md, section 1.
+SNR_v and SNR_t are those of `extraction.extract`, over all parts that move, while the pen is down. What is
+compared with the arm is taken at the arm's own time stamps, all signals through the same first difference,
+neither shifted nor smoothed.
 """
 
 import math
@@ -24,13 +20,15 @@ from typing import NamedTuple
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from pc_client.analysis import measures
 from pc_client.analysis.run import MeasuredRun
 from pc_client.arrays import Array, read_only
 from pc_client.errors import RecordingError
 from pc_client.studies.drawing.drawing import Drawing, spatial
+from pc_client.studies.extraction.extract import ratios
 from pc_client.studies.extraction.smoothing import CUTOFF_HZ, RATE_HZ
 from pc_client.studies.likeness import Likeness, fit_power_law, log_dimensionless_jerk, sparc, speed_peaks
-from pc_client.studies.signals import Trace, decibels, low_passed, velocity
+from pc_client.studies.signals import Trace, low_passed, velocity
 
 #: Cut-off of the low-pass of what was executed, Hz in the time of the hand, and its order.
 _NOISE_HZ = 2.0 * CUTOFF_HZ
@@ -103,11 +101,11 @@ def _executed_part(drawing: Drawing, mark: int, grid: Array, path: CubicSpline) 
     step = (grid[-1] - grid[0]) / (len(grid) - 1)
     margin = round(_MARGIN_S / step)
     wide = grid[0] + step * np.arange(-margin, len(grid) + margin)
-    smooth = _less_noise(positions(wide), 1.0 / step)
+    p = _less_noise(positions(wide), 1.0 / step)
     inside = slice(margin, margin + len(grid))
     frame_t = drawing.recording_time(path.x, mark)
     frame_t = frame_t[(frame_t >= grid[0]) & (frame_t <= grid[-1])]
-    trace = Trace(grid, read_only(smooth[inside]), read_only(velocity(wide, smooth)[inside]))
+    trace = Trace(grid, read_only(p[inside]), read_only(velocity(wide, p)[inside]))
     return ExecutedPart(trace, read_only(frame_t), read_only(positions(frame_t)))
 
 
@@ -123,13 +121,11 @@ def signals(drawing: Drawing, execution: Execution | None = None) -> dict[str, t
     All are in space, in the recording's frame, unit and time.
     """
     parts = drawing.extraction.parts
+    planned = [drawing.planned(part.t, mark) for mark, part in zip(drawing.moving, parts, strict=True)]
     found = {
         "human": tuple(Trace(part.t, spatial(part.p), spatial(part.v)) for part in parts),
         "reconstructed": tuple(Trace(part.t, *part.trajectory.evaluate(part.t)[:2]) for part in parts),
-        "planned": tuple(
-            Trace(part.t, *drawing.planned(part.t, mark)[:2])
-            for mark, part in zip(drawing.moving, parts, strict=True)
-        ),
+        "planned": tuple(Trace(part.t, *plan[:2]) for part, plan in zip(parts, planned, strict=True)),
     }
     if execution is not None:
         found["executed"] = tuple(part.trace for part in execution.parts)
@@ -205,12 +201,10 @@ def judge(drawing: Drawing, executions: Sequence[Execution]) -> Verdict:
     assert extraction.snr_v_db is not None  # something moves
     assert extraction.snr_t_db is not None
     metres = drawing.placement.similarity.scale
+    pairs = zip(own["human"], own["planned"], strict=True)
     return Verdict(
         reconstruction=Agreement(extraction.snr_v_db, extraction.snr_t_db),
-        plan=_agreement(
-            _Pair(human.t, human.p, planned.p)
-            for human, planned in zip(own["human"], own["planned"], strict=True)
-        ),
+        plan=_agreement(_Pair(human.t, human.p, planned.p) for human, planned in pairs),
         human=_likeness(own["human"], metres),
         reconstructed=_likeness(own["reconstructed"], metres),
         runs=tuple(_judge_run(drawing, execution) for execution in executions),
@@ -219,20 +213,19 @@ def judge(drawing: Drawing, executions: Sequence[Execution]) -> Verdict:
 
 def _judge_run(drawing: Drawing, execution: Execution) -> RunVerdict:
     run, metres = execution.run, drawing.placement.similarity.scale
-    pairs = _against_plan(drawing, execution)
-    errors = np.concatenate([np.linalg.norm(pair.actual - pair.reference, axis=1) for pair in pairs])
-    heights = np.concatenate([np.abs(pair.actual[:, 2]) for pair in pairs])
+    plan, human = _pairs(drawing, execution)
+    errors = np.concatenate([np.linalg.norm(pair.actual - pair.reference, axis=1) for pair in plan])
+    heights = np.concatenate([np.abs(pair.actual[:, 2]) for pair in plan])
     # What is left of the error when the delay is undone is, in its mean, the offset of the nominal arm.
     lag = run.snr.velocity_lag_s
-    aligned = executed(drawing, run, lag)
-    aligned_pairs = _against_plan(drawing, aligned)
-    offset = np.vstack([pair.actual - pair.reference for pair in aligned_pairs]).mean(axis=0)
+    aligned_plan, aligned_human = _pairs(drawing, executed(drawing, run, lag))
+    offset = np.vstack([pair.actual - pair.reference for pair in aligned_plan]).mean(axis=0)
     return RunVerdict(
         repetition=run.provenance.repetition,
-        planned=_agreement(pairs),
-        human=_agreement(_against_human(drawing, execution)),
-        planned_aligned=_agreement(aligned_pairs, offset),
-        human_aligned=_agreement(_against_human(drawing, aligned), offset),
+        planned=_agreement(plan),
+        human=_agreement(human),
+        planned_aligned=_agreement(aligned_plan, offset),
+        human_aligned=_agreement(aligned_human, offset),
         lag=lag,
         offset=metres * float(np.linalg.norm(offset)),
         speed_db=run.snr.speed_db,
@@ -250,35 +243,26 @@ class _Pair(NamedTuple):
     actual: Array
 
 
-def _against_plan(drawing: Drawing, execution: Execution) -> list[_Pair]:
-    """Planned and executed positions of each part at the robot's time stamps."""
-    return [
-        _Pair(part.frame_t, drawing.planned(part.frame_t, mark).p, part.frame_p)
-        for mark, part in zip(drawing.moving, execution.parts, strict=True)
-    ]
-
-
-def _against_human(drawing: Drawing, execution: Execution) -> list[_Pair]:
-    """Recorded and executed positions of each part at the robot's time stamps."""
-    return [
-        _Pair(part.frame_t, CubicSpline(human.t, spatial(human.p))(part.frame_t), part.frame_p)
-        for human, part in zip(drawing.extraction.parts, execution.parts, strict=True)
-    ]
+def _pairs(drawing: Drawing, execution: Execution) -> tuple[list[_Pair], list[_Pair]]:
+    """Positions as planned and as recorded, each with those that the robot reported, at its time stamps."""
+    plan, human = [], []
+    for mark, own, part in zip(drawing.moving, drawing.extraction.parts, execution.parts, strict=True):
+        t, p = part.frame_t, part.frame_p
+        plan.append(_Pair(t, drawing.planned(t, mark).p, p))
+        human.append(_Pair(t, CubicSpline(own.t, spatial(own.p))(t), p))
+    return plan, human
 
 
 def _agreement(pairs: Iterable[_Pair], offset: Array | float = 0.0) -> Agreement:
     """SNR_v and SNR_t over all parts, after an offset of the actual positions, (3,), is taken off."""
-    v_signal = v_noise = p_signal = p_noise = 0.0
+    powers = np.zeros(4)
     for t, reference, reported in pairs:
         if len(t) < 2:
             continue  # a part between two frames of the robot
-        error = reported - offset - reference
-        steps = np.diff(t)[:, None]
-        v_signal += float(np.sum((np.diff(reference, axis=0) / steps) ** 2))
-        v_noise += float(np.sum((np.diff(error, axis=0) / steps) ** 2))
-        p_signal += float(np.sum((reference - reference.mean(axis=0)) ** 2))
-        p_noise += float(np.sum(error**2))
-    return Agreement(decibels(v_signal, v_noise), decibels(p_signal, p_noise))
+        error, moved = reported - offset - reference, reference - reference.mean(axis=0)
+        signals = (measures.velocity(t, reference), measures.velocity(t, error), moved, error)
+        powers += [np.sum(values**2) for values in signals]
+    return Agreement(*ratios(powers))
 
 
 def _likeness(parts: Sequence[Trace], metres: float) -> Likeness:
@@ -291,12 +275,9 @@ def _likeness(parts: Sequence[Trace], metres: float) -> Likeness:
     long = [part for part in parts if len(part.t) >= _MIN_SAMPLES and part.speed.max() > 0.0]
 
     def mean(figure: Callable[[Array, float], float]) -> float:
-        """The mean of a figure of the speed over the parts, by their durations."""
-        if not long:
-            return math.nan
         values = [figure(part.speed, (len(part.t) - 1) / part.duration) for part in long]
-        weighted = math.fsum(v * part.duration for v, part in zip(values, long, strict=True))
-        return weighted / math.fsum(part.duration for part in long)
+        durations = [part.duration for part in long]
+        return float(np.average(values, weights=durations)) if long else math.nan
 
     law = fit_power_law(
         np.vstack([metres * part.v for part in parts]),

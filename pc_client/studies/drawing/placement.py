@@ -31,7 +31,6 @@ from pc_client.movements.recipes import largest_scale
 from pc_client.movements.sigma_lognormal import SigmaLognormal
 from pc_client.movements.trajectory import Similarity, about_z
 from pc_client.studies.extraction.extract import Extraction
-from pc_client.studies.extraction.pen import PenPart
 
 #: Deviation at which a speed profile is over for every purpose: 1e-9 of its length is left.
 _OVER = 6.0
@@ -63,33 +62,37 @@ class Mark:
         trajectory = None if self.trajectory is None else self.trajectory.transformed(similarity)
         return Mark(self.begin, self.end, read_only(first), read_only(last), trajectory)
 
-    def length_before(self, lead: float) -> float:
-        """Path length that the strokes have done `lead` s before the pen comes down."""
-        return self._length(self.begin - lead, done=True)
-
-    def length_after(self, lag: float) -> float:
-        """Path length that the strokes have still to do `lag` s after the pen went up."""
-        return self._length(self.end + lag, done=False)
+    def length_outside(self, time: float, *, before: bool) -> float:
+        """Path length done `time` s before the pen comes down, or still to do `time` s after it went up."""
+        if self.trajectory is None:
+            return 0.0
+        t = self.begin - time if before else self.end + time
+        shares = (float(stroke.timing.lognormal.evaluate(t).done) for stroke in self.trajectory.strokes)
+        return math.fsum(
+            length * (share if before else 1.0 - share)
+            for length, share in zip(self.trajectory.lengths.tolist(), shares, strict=True)
+        )
 
     def lead(self, tolerance: float) -> float:
         """How long (s) before the pen comes down the strokes have done no more than a path length."""
-        if self.trajectory is None or self.length_before(0.0) <= tolerance:
-            return 0.0
-        begin = min(s.timing.lognormal.time_at_deviation(-_OVER) for s in self.trajectory.strokes)
-        most = self.begin - begin
-        if self.length_before(most) > tolerance:
-            return most
-        return float(bisect(lambda u: self.length_before(u) - tolerance, 0.0, most, xtol=_TIME_ACCURACY))
+        return self._tail(tolerance, before=True)
 
     def lag(self, tolerance: float) -> float:
-        """How long (s) after the pen went up the strokes have still to do more than a path length."""
-        if self.trajectory is None or self.length_after(0.0) <= tolerance:
+        """How long (s) after the pen went up the strokes have no more than a path length to do."""
+        return self._tail(tolerance, before=False)
+
+    def _tail(self, tolerance: float, *, before: bool) -> float:
+        def too_much(time: float) -> float:
+            return self.length_outside(time, before=before) - tolerance
+
+        if self.trajectory is None or too_much(0.0) <= 0.0:
             return 0.0
-        end = max(s.timing.lognormal.time_at_deviation(_OVER) for s in self.trajectory.strokes)
-        most = end - self.end
-        if self.length_after(most) > tolerance:
-            return most
-        return float(bisect(lambda u: self.length_after(u) - tolerance, 0.0, most, xtol=_TIME_ACCURACY))
+        lognormals = [stroke.timing.lognormal for stroke in self.trajectory.strokes]
+        if before:
+            most = self.begin - min(lognormal.time_at_deviation(-_OVER) for lognormal in lognormals)
+        else:
+            most = max(lognormal.time_at_deviation(_OVER) for lognormal in lognormals) - self.end
+        return most if too_much(most) > 0.0 else float(bisect(too_much, 0.0, most, xtol=_TIME_ACCURACY))
 
     def path(self, tolerance: float, n: int = 801) -> Array:
         """The whole path of the strokes, up to a path length at both ends, and its end points; (m, 3)."""
@@ -98,15 +101,6 @@ class Mark:
             return ends
         t = np.linspace(self.begin - self.lead(tolerance), self.end + self.lag(tolerance), n)
         return np.vstack((ends, self.trajectory.evaluate(t).p))
-
-    def _length(self, t: float, *, done: bool) -> float:
-        if self.trajectory is None:
-            return 0.0
-        shares = [float(stroke.timing.lognormal.evaluate(t).done) for stroke in self.trajectory.strokes]
-        return math.fsum(
-            length * (share if done else 1.0 - share)
-            for length, share in zip(self.trajectory.lengths.tolist(), shares, strict=True)
-        )
 
 
 def marks_of(extraction: Extraction) -> tuple[Mark, ...]:
@@ -119,24 +113,15 @@ def marks_of(extraction: Extraction) -> tuple[Mark, ...]:
         raise MovementError(
             f"{extraction.name}: holds no movement, only dots; give a drawing with a line in it"
         )
-    marks = [
-        Mark(
-            float(part.t[0]),
-            float(part.t[-1]),
-            part.trajectory.target_points[0],
-            part.trajectory.target_points[-1],
-            part.trajectory,
-        )
-        for part in extraction.parts
-    ]
-    marks += [_dot(part) for part in extraction.still]
+    marks = []
+    for part in extraction.parts:
+        points = part.trajectory.target_points
+        marks.append(Mark(float(part.t[0]), float(part.t[-1]), points[0], points[-1], part.trajectory))
+    for still in extraction.still:
+        dot = np.zeros(3)
+        dot[: still.p.shape[1]] = still.p.mean(axis=0)
+        marks.append(Mark(float(still.t[0]), float(still.t[-1]), read_only(dot), read_only(dot), None))
     return tuple(sorted(marks, key=lambda mark: mark.begin))
-
-
-def _dot(part: PenPart) -> Mark:
-    point = np.zeros(3)
-    point[: part.p.shape[1]] = part.p.mean(axis=0)
-    return Mark(float(part.t[0]), float(part.t[-1]), read_only(point), read_only(point), None)
 
 
 _HALF = math.sqrt(0.5)
@@ -231,21 +216,18 @@ def place(marks: Sequence[Mark], drawn: Array, options: PlacementOptions, *, fla
     path = np.vstack([mark.path(_PATH_SHARE * extent) for mark in marks])
     # Seen from the side that the pen is on, the recording's third axis points away where y points down.
     sense = 1.0 if y_up or not flat else -1.0
-    if options.rotation is None:
-        angles = [math.radians(0.5 * step) for step in range(360)]
-    else:
-        angles = [options.rotation]
-    rotations = [(angle, frame @ about_z(sense * angle)) for angle in angles]
-    scales = [largest_scale(path @ R.T, options.box.size - np.abs(lift)) for _, R in rotations]
+    half_degrees = [math.radians(0.5 * step) for step in range(360)]
+    angles = half_degrees if options.rotation is None else [options.rotation]
+    rotations = [frame @ about_z(sense * angle) for angle in angles]
+    scales = [largest_scale(path @ R.T, options.box.size - np.abs(lift)) for R in rotations]
     best = int(np.argmax(scales))
-    angle, R = rotations[best]
-    wanted = math.inf if options.size is None else options.size / extent
-    scale = min(scales[best], wanted)
+    R = rotations[best]
+    scale = scales[best] if options.size is None else min(scales[best], options.size / extent)
     turned = scale * path @ R.T
     low = turned.min(axis=0) + np.minimum(lift, 0.0)
     high = turned.max(axis=0) + np.maximum(lift, 0.0)
     similarity = Similarity(scale, R, options.box.centre - 0.5 * (low + high))
-    return Placement(similarity, read_only(lift), angle, options.plane if flat else "space", y_up)
+    return Placement(similarity, read_only(lift), angles[best], options.plane if flat else "space", y_up)
 
 
 def inverse(similarity: Similarity) -> Similarity:

@@ -69,16 +69,18 @@ class Entry:
         """Of the movement."""
         return self.drawing.movement.name
 
+    @property
+    def provenance(self) -> Provenance:
+        """Of its first run."""
+        return self.executions[0].run.provenance
+
 
 def table_of(verdict: Verdict) -> pl.DataFrame:
     """A row for each signal of one drawing, with `COLUMNS`."""
+    strokes = {**_agreement(human=verdict.reconstruction), **asdict(verdict.reconstructed)}
     rows = [
         {"signal": "human", **asdict(verdict.human)},
-        {
-            "signal": "reconstructed",
-            **_agreement(human=verdict.reconstruction),
-            **asdict(verdict.reconstructed),
-        },
+        {"signal": "reconstructed", **strokes},
         {"signal": "planned", **_agreement(human=verdict.plan)},
     ]
     for run in verdict.runs:
@@ -140,7 +142,7 @@ def _common_facts(entries: Sequence[Entry]) -> dict[str, str]:
 
 def drawings_json(entries: Sequence[Entry]) -> dict[str, Any]:
     """The content of `draw.json`; figures that are not finite become null."""
-    first = _provenance(entries[0])
+    first = entries[0].provenance
     found: dict[str, Any] = finite(
         {
             "robot": first.robot,
@@ -164,7 +166,7 @@ def drawings_markdown(entries: Sequence[Entry]) -> str:
 
 def drawing_rich(entry: Entry) -> RichTable:
     """The table of one drawing for the terminal."""
-    first = _provenance(entry)
+    first = entry.provenance
     title = f"{entry.name}: {first.arm}, controller {first.controller}; SNR in dB"
     return to_rich(table_of(entry.verdict), COLUMNS[:_ON_TERMINAL], title=title)
 
@@ -190,10 +192,6 @@ def _drawing_json(entry: Entry) -> dict[str, Any]:
         "delays_s_of_the_hand": drawing.delays.tolist(),
         **asdict(entry.verdict),
     }
-
-
-def _provenance(entry: Entry) -> Provenance:
-    return entry.executions[0].run.provenance
 
 
 def _place(drawing: Drawing) -> str:
@@ -247,6 +245,6 @@ def render_page(entries: Sequence[Entry], figures: Mapping[str, Mapping[str, Fig
         sections=sections,
         colours=COLOURS,
         facts=_common_facts(entries),
-        origin=_provenance(entries[0]).origin,
-        seed=_provenance(entries[0]).seed,
+        origin=entries[0].provenance.origin,
+        seed=entries[0].provenance.seed,
     )

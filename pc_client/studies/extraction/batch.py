@@ -6,7 +6,6 @@
 Files are read here and their bytes handed to the jobs, so a worker on another machine needs no disk of ours.
 A recording that cannot be used has an outcome that says so; it does not stop the others.
 
-`extraction.json` is a list of rows, one for each recording that could be read, in the order they were given.
 `strokes.csv` holds every stroke as the theory writes it, so that the movement can be rebuilt from it alone.
 A stroke runs from (x0, y0, z0) to (x1, y1, z1), in the unit of the recording, turning by `arc_angle` [rad] in
 the plane that `tilt` [rad] chooses (see `sigma_lognormal.arc_frame`); length is D, t0 is in s. Parts and
@@ -35,10 +34,21 @@ Row = Mapping[str, Any]
 
 _FIGURES = (
     Column("file", align="left", kind=str),
-    Column("snr_v_db", "SNR_v", "dB", ".2f", missing="-", text="missing: nothing moves"),
-    Column("snr_t_db", "SNR_t", "dB", ".2f", missing="-", text="likewise"),
+    Column("snr_v_db", "SNR_v", "dB", ".2f", "right", "-", text="missing: nothing moves"),
+    Column("snr_t_db", "SNR_t", "dB", ".2f", "right", "-", text="likewise"),
+    Column(
+        "raw_snr_v_db",
+        "raw SNR_v",
+        "dB",
+        ".2f",
+        "right",
+        "-",
+        "raw\nSNR_v",
+        text="of the samples as they are",
+    ),
+    Column("raw_snr_t_db", "raw SNR_t", "dB", ".2f", "right", "-", "raw\nSNR_t", text="likewise"),
     Column("n_strokes", "strokes", kind=int),
-    Column("n_speed_peaks", "speed peaks", kind=int),
+    Column("n_speed_peaks", "speed peaks", narrow="speed\npeaks", kind=int),
 )
 """The keys of extraction.json."""
 
@@ -138,7 +148,7 @@ def extract_many(
         ClientError: the executor broke down.
     """
     outcomes: dict[int, ExtractionOutcome] = {}
-    running: dict[Future[ExtractionOutcome], tuple[int, str, int]] = {}  # index, name, bytes
+    running: dict[Future[ExtractionOutcome], tuple[int, int]] = {}  # index, bytes
 
     def keep(index: int, outcome: ExtractionOutcome) -> None:
         outcomes[index] = outcome
@@ -146,20 +156,20 @@ def extract_many(
 
     def wait_for_some() -> None:
         for future in wait(running, return_when=FIRST_COMPLETED).done:
-            index, name, _ = running.pop(future)
-            keep(index, _result(future, name))
+            index, _ = running.pop(future)
+            keep(index, _result(future, sources[index].name))
 
     for index, (source, content) in enumerate(contents(sources)):
         if isinstance(content, RecordingError):
             keep(index, ExtractionOutcome(source.name, error=str(content)))
             continue
         arguments = (source.name, content, options or ExtractOptions(), time_unit, index < n_pictures)
-        running[executor.submit(_extract_one, *arguments)] = (index, source.name, len(content))
-        while len(running) >= _IN_FLIGHT or sum(n for _, _, n in running.values()) > _BYTES_IN_FLIGHT:
+        running[executor.submit(_extract_one, *arguments)] = (index, len(content))
+        while len(running) >= _IN_FLIGHT or sum(n for _, n in running.values()) > _BYTES_IN_FLIGHT:
             wait_for_some()
     while running:
         wait_for_some()
-    return [outcomes[index] for index in sorted(outcomes)]
+    return [outcomes[index] for index in range(len(sources))]
 
 
 def _extract_one(

@@ -87,10 +87,8 @@ class Chain:
 
     def picked(self, which: NDArray[np.bool_ | np.intp], targets: Array) -> Chain:
         """Some of the strokes, or all in another order, from target to target of these."""
-        median, width, sigma, arc_angle, normal = (
-            values[which] for values in (self.median, self.width, self.sigma, self.arc_angle, self.normal)
-        )
-        return Chain(median, width, sigma, arc_angle, normal, targets)
+        names = ("median", "width", "sigma", "arc_angle", "normal")
+        return replace(self, targets=targets, **{name: getattr(self, name)[which] for name in names})
 
     def time_at_deviation(self, z: float) -> Array:
         """Times (s,) at which each stroke has done Phi(z) of its length."""
@@ -140,11 +138,9 @@ def without(chain: Chain, drop: NDArray[np.bool_]) -> Chain:
 
     The end of the whole chain is kept when its last stroke is dropped.
     """
-    keep = ~drop
-    targets = np.vstack((chain.targets[:1], chain.targets[1:][keep]))
-    if drop[-1]:
-        targets[-1] = chain.targets[-1]
-    return chain.picked(keep, targets)
+    targets = np.vstack((chain.targets[:1], chain.targets[1:][~drop]))
+    targets[-1] = chain.targets[-1]
+    return chain.picked(~drop, targets)
 
 
 def with_chords(chain: Chain, least: float) -> Chain:
@@ -167,7 +163,7 @@ def with_chords(chain: Chain, least: float) -> Chain:
 def in_order(chain: Chain) -> Chain:
     """The strokes sorted by their medians. The movement stays the same: each keeps its own chord."""
     order = np.argsort(chain.median, kind="stable")
-    if np.array_equal(order, np.arange(len(order))):
+    if (np.diff(order) > 0).all():  # they are
         return chain
     ends = chain.targets[0] + np.cumsum(chain.chords[order], axis=0)
     return chain.picked(order, np.vstack((chain.targets[:1], ends)))
@@ -183,11 +179,8 @@ def sigma_lognormal(chain: Chain, duration: float) -> SigmaLognormal:
     strokes = []
     for j, chord in enumerate(np.diff(targets, axis=0)):
         unit = chord / np.linalg.norm(chord)
-        timing = Lognormal(
-            float(chain.median[j] - chain.width[j] / chain.sigma[j]),
-            math.log(chain.width[j] / chain.sigma[j]),
-            float(chain.sigma[j]),
-        )
+        median, width, sigma = float(chain.median[j]), float(chain.width[j]), float(chain.sigma[j])
+        timing = Lognormal(median - width / sigma, math.log(width / sigma), sigma)
         # A stroke of the package swings from -m to +m, m the normal in its plane: turning about n, that is
         # n x chord.
         tilt = tilt_of_normal(unit, np.cross(chain.normal[j], unit))

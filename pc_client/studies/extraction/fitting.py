@@ -1,9 +1,9 @@
 """The sequence of a fit: first strokes, joint refinement, further strokes while they raise the SNR enough.
 
 All parts of a recording share one budget of strokes, and a further stroke goes to where most of the velocity
-is still unexplained, whichever part that is. Candidates are found by matched pursuit: the lognormal of some
-width at some time that reduces the energy of the residual velocity most is subtracted, and the search goes
-on; the strokes are refined together afterwards (`refine`).
+is still unexplained, whichever part that is. Candidates are found by matched pursuit: the Gaussian (the speed
+profile of a stroke of small sigma, nearly) of some width at some time that reduces the energy of the residual
+velocity most is subtracted, and the search goes on; the strokes are refined together afterwards (`refine`).
 
 Source: the order of Robust XZERO (largest first, subtract, go on); docs/extraction.md, section 6.
 """
@@ -65,12 +65,11 @@ class FitOptions:
     least_db: float = 15.0
 
 
-@dataclass(frozen=True, slots=True)
-class Fitted:
+class Fitted(NamedTuple):
     """The result of a fit.
 
     Attributes:
-        through: True: the signal is so clean that the strokes were fitted through the low-pass: the filtered
+        through: the signal is so clean that the strokes were fitted through the low-pass: the filtered
             strokes give the recording, and are compared with it.
     """
 
@@ -86,9 +85,9 @@ def fit_parts(parts: Sequence[Trace], budget: int, options: FitOptions) -> Fitte
             `FitOptions`. Every part gets one for each of its speed peaks in any case.
     """
     fitting = _Fitting(parts, options)
-    if fitting.unexplained() < _share(_PERHAPS_CLEAN_DB):
+    if fitting.snr_v() > _PERHAPS_CLEAN_DB:
         sharp = fitting.given_back()
-        if fitting.unexplained(sharp, through=True) < _share(options.enough_db):
+        if fitting.snr_v(sharp, through=True) > options.enough_db:
             return Fitted(fitting.chains(sharp), through=True)
     for round_ in range(options.rounds):
         left = budget - fitting.n_strokes
@@ -96,12 +95,10 @@ def fit_parts(parts: Sequence[Trace], budget: int, options: FitOptions) -> Fitte
         if left <= 0 or not fitting.add(wanted):
             break
     for _ in range(_RESCUES):
-        if fitting.unexplained() < _share(options.least_db):
-            break
-        if not fitting.add(math.ceil(0.1 * fitting.n_strokes)):
+        if fitting.snr_v() > options.least_db or not fitting.add(math.ceil(0.1 * fitting.n_strokes)):
             break
     fitting.finish()
-    is_clean = fitting.unexplained() < _share(_CLEAN_DB)
+    is_clean = fitting.snr_v() > _CLEAN_DB
     return Fitted(fitting.chains(fitting.given_back() if is_clean else fitting.fits), through=is_clean)
 
 
@@ -110,8 +107,6 @@ def left_over(chain: Chain, part: Trace, *, through: bool) -> tuple[Array, Array
 
     With `through` the strokes go through the same low-pass first.
     """
-    # What trajectory.evaluate leaves, but piece by piece: all strokes at all times are too many in a long
-    # recording.
     p_left, v_left = residuals(chain, part)
     if not through:
         return p_left, v_left
@@ -142,23 +137,24 @@ class _Fitting:
         """Of all parts."""
         return sum(len(fit.chain) for fit in self.fits)
 
-    def unexplained(self, fits: Sequence[Fit] | None = None, *, through: bool = False) -> float:
-        """Share of the energy of the velocity that strokes leave: 10^(-SNR_v / 10)."""
+    def snr_v(self, fits: Sequence[Fit] | None = None, *, through: bool = False) -> float:
+        """SNR of the velocity over all parts, dB."""
         left = (
             left_over(fit.chain, part, through=through)[1]
             for fit, part in zip(fits or self.fits, self._parts, strict=True)
         )
-        return sum(float(np.sum(v**2)) for v in left) / self._v_size**2
+        return decibels(self._v_size**2, sum(float(np.sum(v**2)) for v in left))
 
     def add(self, wanted: int) -> bool:
         """Add the best candidates and refine their parts; False when none is worth adding."""
         left = [residuals(fit.chain, part)[1] for fit, part in zip(self.fits, self._parts, strict=True)]
         energy = sum(float(np.sum(v**2)) for v in left)
-        if energy < self._v_size**2 * _share(self._options.enough_db):
+        snr_v = decibels(self._v_size**2, energy)
+        if snr_v > self._options.enough_db:
             return False
         # What a stroke must take of the energy to raise the SNR by a share of what each has brought so far.
-        raised = _PAYS * max(decibels(self._v_size**2, energy), 0.0) / self.n_strokes
-        least = energy * (1.0 - _share(raised))
+        raised = _PAYS * max(snr_v, 0.0) / self.n_strokes
+        least = energy * (1.0 - 10.0 ** (-raised / 10.0))
         found = [
             (candidate, index)
             for index, (part, v) in enumerate(zip(self._parts, left, strict=True))
@@ -167,9 +163,7 @@ class _Fitting:
         ]
         best = sorted(found, key=lambda pair: -pair[0].energy)[:wanted]
         for index in sorted({index for _, index in best}):
-            mine = [candidate for candidate, owner in best if owner == index]
-            median = np.array([candidate.median for candidate in mine])
-            width = np.array([candidate.width for candidate in mine])
+            median, width, _ = np.array([candidate for candidate, owner in best if owner == index]).T
             chain = inserted(self._tidy(index), median, width, TYPICAL_SIGMA)
             self.fits[index] = refine(chain, self._goals[index], self._options.iterations)
         return bool(found)
@@ -194,9 +188,8 @@ class _Fitting:
                 p_left, v_left = residuals(fit.chain, part)
                 p_model, v_model = part.p - p_left, part.v - v_left
                 passed = less_noise(p_model, 1.0 / part.step)
-                goal = self._goal(
-                    part, part.p + p_model - passed, part.v + v_model - velocity(part.t, passed)
-                )
+                v_passed = velocity(part.t, passed)
+                goal = self._goal(part, part.p + p_model - passed, part.v + v_model - v_passed)
                 fit = refine(fit.chain, goal, self._options.last_iterations, tolerance=1e-4)
                 if fit.cost > _STAGNANT * cost:
                     break
@@ -214,9 +207,7 @@ class _Fitting:
     def _goal(self, part: Trace, p: Array, v: Array) -> Goal:
         """What the strokes of a part shall approximate: some of the samples of p and v."""
         decimation = max(1, min(_DECIMATION, len(part.t) // _LEAST_SAMPLES))
-        rows = np.arange(0, len(part.t), decimation)
-        if rows[-1] != len(part.t) - 1:
-            rows = np.append(rows, len(part.t) - 1)
+        rows = np.unique([*range(0, len(part.t), decimation), len(part.t) - 1])
         weight = math.sqrt(len(part.t) / len(rows))
         freedom = part.p.shape[1] * (1.0 + 2.0 * CUTOFF_HZ * part.duration)
         signal = Trace(part.t[rows], p[rows], v[rows])
@@ -234,14 +225,9 @@ class _Fitting:
         return without(chain, idle) if idle.any() else chain
 
 
-def _share(db: float) -> float:
-    """The share of an energy that is so many dB below it."""
-    return float(10.0 ** (-db / 10.0))
-
-
-#: Widths (s) of the lognormals that are tried: of the strokes of handwriting, from hasty to calm.
+#: Widths (s) of the Gaussians that are tried: of the strokes of handwriting, from hasty to calm.
 _TRIED_WIDTHS_S = (0.02, 0.032, 0.05)
-#: Of a tried lognormal, in widths on each side of its middle.
+#: Of a Gaussian, in widths on each side of its middle.
 _REACH = 3.0
 
 
@@ -254,7 +240,7 @@ class Candidate(NamedTuple):
 
 
 def best_candidates(t: Array, v_left: Array, count: int) -> list[Candidate]:
-    """The lognormals that reduce the energy of a residual velocity (n, dim) most: the best ones, in order.
+    """The Gaussians that reduce the energy of a residual velocity (n, dim) most: the best ones, in order.
 
     The times (n,), s, are uniform.
     """
@@ -275,9 +261,8 @@ def best_candidates(t: Array, v_left: Array, count: int) -> list[Candidate]:
         low, high = max(0, at - reach), min(len(t), at + reach + 1)
         margin = low - max(0, low - reach)
         blocked = gains == -1.0
-        for row, kernel in enumerate(kernels):
-            nearby = _gains(left[low - margin : high + reach], kernel)
-            gains[row, low:high] = nearby[margin:][: high - low]
+        nearby = np.stack([_gains(left[low - margin : high + reach], kernel) for kernel in kernels])
+        gains[:, low:high] = nearby[:, margin:][:, : high - low]
         gains[blocked] = -1.0
         core = max(1, round(_TRIED_WIDTHS_S[which] / step))
         gains[:, max(0, at - core) : at + core + 1] = -1.0
@@ -285,21 +270,19 @@ def best_candidates(t: Array, v_left: Array, count: int) -> list[Candidate]:
 
 
 def _kernel(width: float) -> Array:
-    """A lognormal with energy 1, width in samples."""
+    """A Gaussian with energy 1, width in samples."""
     reach = max(1, round(_REACH * width))
-    shape = np.exp(-0.5 * (np.arange(-reach, reach + 1) / width) ** 2)
-    scaled: Array = shape / np.sqrt(shape @ shape)
-    return scaled
+    shape: Array = np.exp(-0.5 * (np.arange(-reach, reach + 1) / width) ** 2)
+    return shape / math.sqrt(shape @ shape)
 
 
 def _gains(left: Array, kernel: Array) -> Array:
     """Energy that the kernel, centred at each sample, explains; near the ends a cut kernel, rescaled."""
     n, reach = len(left), len(kernel) // 2
     power = np.convolve(np.ones(n), kernel**2)[reach : reach + n]
-    total = np.zeros(n)
-    for column in left.T:
-        total += np.convolve(column, kernel)[reach : reach + n] ** 2
-    return total / power
+    found = [np.convolve(column, kernel)[reach : reach + n] ** 2 for column in left.T]
+    gains: Array = np.sum(found, axis=0) / power
+    return gains
 
 
 def _subtract(left: Array, kernel: Array, at: int) -> None:

@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.integrate import cumulative_trapezoid, trapezoid
 from scipy.signal import find_peaks
 
 from pc_client.arrays import Array
@@ -46,22 +47,17 @@ def initial_chain(part: Trace) -> Chain:
     """One stroke for each interval."""
     marks = salient_points(part)
     speed = part.speed
-    path_length = np.concatenate(([0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1])) * part.step))
+    path_length = cumulative_trapezoid(speed, dx=part.step, initial=0.0)
     first = [_timing(part.t[a : b + 1], speed[a : b + 1]) for a, b in pairwise(marks)]
     median, width, sigma = np.array(first).T
     targets = part.p[marks]
-    dim = targets.shape[1]
-    arc_angles = [_arc_angle(part, path_length, a, b) for a, b in pairwise(marks)]
-    vectors = np.array(arc_angles)
-    chords = np.zeros((len(vectors), 3))
-    chords[:, :dim] = np.diff(targets, axis=0)
-    if dim == 2:
-        return Chain(
-            median, width, sigma, vectors[:, 2], np.tile([0.0, 0.0, 1.0], (len(vectors), 1)), targets
-        )
+    vectors = np.array([_arc_angle(part, path_length, a, b) for a, b in pairwise(marks)])
+    if targets.shape[1] == 2:
+        up = np.tile([0.0, 0.0, 1.0], (len(vectors), 1))
+        return Chain(median, width, sigma, vectors[:, 2], up, targets)
     sizes = np.linalg.norm(vectors, axis=1)
     normals = np.where(sizes[:, None] > 1e-6, vectors, [0.0, 0.0, 1.0])
-    return Chain(median, width, sigma, sizes, normals_across(chords, normals), targets)
+    return Chain(median, width, sigma, sizes, normals_across(np.diff(targets, axis=0), normals), targets)
 
 
 def _timing(t: Array, speed: Array) -> tuple[float, float, float]:
@@ -79,7 +75,7 @@ def _timing(t: Array, speed: Array) -> tuple[float, float, float]:
 def _by_area(t: Array, speed: Array) -> tuple[float, float, float]:
     """The lognormal with the area and the peak of the measured speed profile; it always exists."""
     top = int(np.argmax(speed))
-    area = float(np.sum(0.5 * (speed[1:] + speed[:-1]))) * float(t[1] - t[0])
+    area = float(trapezoid(speed, dx=float(t[1] - t[0])))
     peak = float(speed[top])
     width = _clipped(_PEAK_WIDTH * area / peak if peak > 0.0 else 0.0, Bounds().width)
     return float(t[top]) + width * TYPICAL_SIGMA, width, TYPICAL_SIGMA
@@ -90,12 +86,9 @@ def _by_closed_forms(t: Array, speed: Array) -> list[tuple[float, float, float]]
     if points is None:
         return []
     v2, v3, v4 = points.speeds
+    sigmas = sigma_from_peak_ratio(v2 / v3), sigma_from_peak_ratio(v4 / v3), sigma_from_slope_ratio(v4 / v2)
     found = []
-    for sigma in (
-        sigma_from_peak_ratio(v2 / v3),
-        sigma_from_peak_ratio(v4 / v3),
-        sigma_from_slope_ratio(v4 / v2),
-    ):
+    for sigma in sigmas:
         lognormal = lognormal_from_points(points, _clipped(sigma, Bounds().sigma))
         width = _clipped(math.exp(lognormal.mu) * lognormal.sigma, Bounds().width)
         found.append((lognormal.median, width, lognormal.sigma))
@@ -127,8 +120,8 @@ def _clipped(value: float, bounds: tuple[float, float]) -> float:
 class CharacteristicPoints(NamedTuple):
     """Times (s) and speeds of the inflection before the peak, the peak and the inflection after it."""
 
-    times: tuple[float, float, float]
-    speeds: tuple[float, float, float]
+    times: tuple[float, ...]
+    speeds: tuple[float, ...]
 
 
 def sigma_from_peak_ratio(ratio: float) -> float:
@@ -161,9 +154,7 @@ def characteristic_points(t: Array, speed: Array) -> CharacteristicPoints | None
         return None
     slope = np.gradient(speed, t)
     before, after = int(np.argmax(slope[: top + 1])), top + int(np.argmin(slope[top:]))
-    at = (before, top, after)
-    times = (float(t[before]), float(t[top]), float(t[after]))
-    speeds = (float(speed[before]), float(speed[top]), float(speed[after]))
-    if not (times[0] < times[1] < times[2] and 0.0 < speeds[0] < speeds[1] > speeds[2] > 0.0) or 0 in at:
-        return None
-    return CharacteristicPoints(times, speeds)
+    at = [before, top, after]
+    points = CharacteristicPoints(tuple(t[at].tolist()), tuple(speed[at].tolist()))
+    v2, v3, v4 = points.speeds
+    return points if 0 < before < top < after and 0.0 < v2 < v3 > v4 > 0.0 else None

@@ -20,6 +20,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -95,25 +96,20 @@ def ordered_part(t: ArrayLike, p: ArrayLike) -> tuple[PenPart | None, tuple[str,
         The part, or None when no sample is left, and remarks on what was done.
     """
     times, points = np.asarray(t, dtype=np.float64), np.asarray(p, dtype=np.float64)
-    remarks = []
     finite = np.isfinite(times) & np.isfinite(points).all(axis=1)
-    if not finite.all():
-        remarks.append(_counted(int(np.count_nonzero(~finite)), "that are not numbers left out"))
-        times, points = times[finite], points[finite]
-    if len(times) == 0:
-        return None, tuple(remarks)
-    latest = np.maximum.accumulate(times)
-    late = times < latest
-    if late.any():
-        remarks.append(_counted(int(np.count_nonzero(late)), "with time running backwards left out"))
-        times, points = times[~late], points[~late]
-    unique, inverse, counts = np.unique(times, return_inverse=True, return_counts=True)
-    if len(unique) < len(times):
-        remarks.append(_counted(len(times) - len(unique), "with a repeated time stamp merged by their mean"))
+    counted = {"that are not numbers left out": int(np.sum(~finite))}
+    times, points = times[finite], points[finite]
+    part = None
+    if len(times):
+        ahead = times >= np.maximum.accumulate(times)
+        counted["with time running backwards left out"] = int(np.sum(~ahead))
+        unique, inverse, counts = np.unique(times[ahead], return_inverse=True, return_counts=True)
+        counted["with a repeated time stamp merged by their mean"] = len(inverse) - len(unique)
         sums = np.zeros((len(unique), points.shape[1]))
-        np.add.at(sums, inverse, points)
-        times, points = unique, sums / counts[:, None]
-    return PenPart(times, points), tuple(remarks)
+        np.add.at(sums, inverse, points[ahead])
+        part = PenPart(unique, sums / counts[:, None])
+    remarks = (f"{n} sample{'s' if n != 1 else ''} {what}" for what, n in counted.items() if n)
+    return part, tuple(remarks)
 
 
 def on_one_axis(name: str, parts: Iterable[PenPart], remarks: Iterable[str] = ()) -> PenRecording:
@@ -121,10 +117,6 @@ def on_one_axis(name: str, parts: Iterable[PenPart], remarks: Iterable[str] = ()
     kept = tuple(parts)
     start = min((part.t[0] for part in kept), default=0.0)
     return PenRecording(name, tuple(PenPart(part.t - start, part.p) for part in kept), tuple(remarks))
-
-
-def _counted(count: int, what: str) -> str:
-    return f"{count} sample{'s' if count != 1 else ''} {what}"
 
 
 #: Seconds of each unit of time.
@@ -158,32 +150,12 @@ _UNIT_NAMES = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class _Columns:
-    """Where x, y[, z] and t stand in a line, how many columns it has, and the unit of t if it is given."""
+class _Columns(NamedTuple):
+    """Where x, y[, z], t stand in a line, how many columns it has, and the unit of t if it is given."""
 
     places: tuple[int, ...]
-    time: int
-    count: int
-    unit: str | None
-
-
-@dataclass(slots=True)
-class _Table:
-    """What a text holds: its parts, each a list of rows of x, y[, z], t, and remarks about them."""
-
-    parts: list[list[list[float]]]
-    columns: _Columns | None = None
-    marked: bool = False
-
-
-def read_pen(path: str | Path, time_unit: str | None = None) -> PenRecording:
-    """Read one text file; the unit of time is as of `parse_pen`.
-
-    Raises:
-        RecordingError: the file cannot be read or makes no sense; the message names file and line.
-    """
-    return parse_pen(FILE_KINDS["pen"].read_bytes(Path(path)), str(path), time_unit)
+    n_columns: int
+    unit: str | None = None
 
 
 def parse_pen(content: bytes, name: str, time_unit: str | None = None) -> PenRecording:
@@ -201,46 +173,37 @@ def parse_pen(content: bytes, name: str, time_unit: str | None = None) -> PenRec
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise RecordingError(f"{name}: no text file (byte {error.start} is not UTF-8)") from error
-    table = _rows(text, name)
-    arrays = [np.array(rows) for rows in table.parts if rows]
-    if not arrays:
-        raise RecordingError(f"{name}: no samples; give lines of x,y,t or x,y,z,t")
-    unit = time_unit or (table.columns.unit if table.columns else None) or _unit_of(arrays, table.marked)
-    return _recording(arrays, TIME_UNITS[unit], name)
-
-
-def _rows(text: str, name: str) -> _Table:
-    table = _Table([[]])
+    parts: list[list[list[float]]] = [[]]  # rows of x, y[, z], t
+    columns = None
     n_samples = 0
     for number, line in enumerate(io.StringIO(text, newline=None), start=1):
         cells = line.strip()
         if not cells or cells.startswith("#"):
             continue
         if cells.upper() in _MARKS:
-            table.marked = True
-            table.parts.append([])
+            parts.append([])
             continue
-        fields = _fields(cells)
-        if table.columns is None:
-            table.columns = _columns(fields, f"{name}, line {number}")
-            if not _is_number(fields[table.columns.time]):
+        where = f"{name}, line {number}"
+        separator = next((mark for mark in _SEPARATORS if mark in cells), None)  # None: any run of blanks
+        fields = [field.strip().strip("\"'") for field in cells.split(separator)]
+        if columns is None:
+            columns = _columns(fields, where)
+            if not _is_number(fields[columns.places[-1]]):
                 continue
-        elif len(fields) != table.columns.count:
+        elif len(fields) != columns.n_columns:
             raise RecordingError(
-                f"{name}, line {number}: {len(fields)} columns after lines of {table.columns.count}; "
+                f"{where}: {len(fields)} columns after lines of {columns.n_columns}; "
                 "give every sample the same columns"
             )
         n_samples += 1
         if n_samples > MOST_SAMPLES:
             raise RecordingError(f"{name}: more than {MOST_SAMPLES} samples; cut the recording")
-        places = (*table.columns.places, table.columns.time)
-        table.parts[-1].append([_number(fields[place], name, number) for place in places])
-    return table
-
-
-def _fields(cells: str) -> list[str]:
-    separator = next((mark for mark in _SEPARATORS if mark in cells), None)  # None: any run of blanks
-    return [field.strip().strip("\"'") for field in cells.split(separator)]
+        parts[-1].append([_number(fields[place], where) for place in columns.places])
+    arrays = [np.array(rows) for rows in parts if rows]
+    if columns is None or not arrays:
+        raise RecordingError(f"{name}: no samples; give lines of x,y,t or x,y,z,t")
+    unit = time_unit or columns.unit or _unit_of(arrays, is_marked=len(parts) > 1)
+    return _recording(arrays, TIME_UNITS[unit], name)
 
 
 def _columns(fields: Sequence[str], where: str) -> _Columns:
@@ -248,24 +211,22 @@ def _columns(fields: Sequence[str], where: str) -> _Columns:
     if all(_is_number(field) for field in fields):
         if len(fields) not in (3, 4):
             raise RecordingError(f"{where}: {len(fields)} columns and no header; give x,y,t or x,y,z,t")
-        return _Columns(tuple(range(len(fields) - 1)), len(fields) - 1, len(fields), None)
+        return _Columns(tuple(range(len(fields))), len(fields))
     names = [_name_and_unit(field) for field in fields]
     places = {name: index for index, (name, _) in reversed(list(enumerate(names)))}
-    times = [index for index, (name, _) in enumerate(names) if name in _TIME_NAMES]
-    if not times or "x" not in places or "y" not in places:
+    time = next((index for index, (name, _) in enumerate(names) if name in _TIME_NAMES), None)
+    if time is None or "x" not in places or "y" not in places:
         given = ", ".join(fields)[:60]
         raise RecordingError(f'{where}: "{given}" is neither a sample nor a header with x, y and t')
-    space = tuple(places[axis] for axis in ("x", "y", "z") if axis in places)
-    return _Columns(space, times[0], len(fields), names[times[0]][1])
+    space = [places[axis] for axis in ("x", "y", "z") if axis in places]
+    return _Columns((*space, time), len(fields), names[time][1])
 
 
 def _name_and_unit(field: str) -> tuple[str, str | None]:
     """Split a column's name: "Time [ms]", "t_ms" and "time (msec)" are (t or time, ms)."""
-    words = [word for word in re.split(r"[\s_\[\]()/:.]+", field.lower()) if word]
-    if not words:
-        return "", None
-    unit = next((_UNIT_NAMES.get(word, word) for word in words[1:]), None)
-    return words[0], unit if unit in TIME_UNITS else None
+    name, *words = [word for word in re.split(r"[\s_\[\]()/:.]+", field.lower()) if word] or [""]
+    unit = _UNIT_NAMES.get(words[0], words[0]) if words else None
+    return name, unit if unit in TIME_UNITS else None
 
 
 def _is_number(field: str) -> bool:
@@ -278,26 +239,25 @@ def _is_number(field: str) -> bool:
     return True
 
 
-def _number(field: str, name: str, line: int) -> float:
+def _number(field: str, where: str) -> float:
     if field.lower() in _MISSING:
         return math.nan
-    try:
-        value = float(field)
-    except ValueError:
-        raise RecordingError(f'{name}, line {line}: "{field[:40]}" is not a number') from None
+    if not _is_number(field):
+        raise RecordingError(f'{where}: "{field[:40]}" is not a number')
+    value = float(field)
     if abs(value) > _FARTHEST:
-        raise RecordingError(f'{name}, line {line}: "{field[:40]}" is more than {_FARTHEST:g}')
+        raise RecordingError(f'{where}: "{field[:40]}" is more than {_FARTHEST:g}')
     return value
 
 
-def _unit_of(parts: Sequence[Array], marked: bool) -> str:
+def _unit_of(parts: Sequence[Array], *, is_marked: bool) -> str:
     with np.errstate(invalid="ignore"):
         steps = np.concatenate([np.diff(part[:, -1]) for part in parts])
         steps = steps[np.isfinite(steps) & (steps > 0.0)]
     if len(steps) == 0:
         return "s"
     step = float(np.median(steps))
-    units = ("s", "ms") if marked else tuple(TIME_UNITS)
+    units = ("s", "ms") if is_marked else tuple(TIME_UNITS)
     return next((unit for unit in units if step * TIME_UNITS[unit] < _LONGEST_STEP_S), units[-1])
 
 

@@ -92,14 +92,13 @@ def refine(chain: Chain, goal: Goal, iterations: int, tolerance: float = 3e-3) -
             tried = moved(chain, step, goal.bounds)
             then = _regularized(_data_equations(tried, goal), tried, weight, top_speed)
             if then.cost < now.cost:
-                gained = now.cost - then.cost
+                gained, before = now.cost - then.cost, now.cost
                 foreseen = float(step @ (damping * _diagonal(now) * step + now.gradient))
                 success = gained / max(foreseen, 1e-300)
                 damping *= max(1.0 / 3.0, 1.0 - (2.0 * success - 1.0) ** 3)
                 damping, growth = max(damping, _LEAST_DAMPING), 2.0
-                is_last = gained < tolerance * now.cost
                 chain, now = tried, then
-                if is_last:
+                if gained < tolerance * before:
                     break
                 continue
         damping *= growth
@@ -143,9 +142,8 @@ def _bent(chain: Chain, arc_angle: Array, bending: Array, chords: Array) -> tupl
     """Arc angles and normals after a step: arc angle x normal is a vector, and bending moves it sideways."""
     sideways = np.cross(chain.normal, chain.chords)
     norms = np.linalg.norm(sideways, axis=1, keepdims=True)
-    vector = arc_angle[:, None] * chain.normal + bending[:, None] * sideways / np.where(
-        norms > 0.0, norms, 1.0
-    )
+    sideways /= np.where(norms > 0.0, norms, 1.0)
+    vector = arc_angle[:, None] * chain.normal + bending[:, None] * sideways
     size = np.linalg.norm(vector, axis=1)
     bent = size > 1e-12
     direction = np.where(bent[:, None], vector / np.where(bent, size, 1.0)[:, None], chain.normal)
@@ -188,7 +186,7 @@ def linearise(chain: Chain, t: Array, first: int, last: int) -> Linearisation:
     chord = np.diff(targets, axis=0)
     count, dim = chord.shape
     turning = _turning(normal, dim)
-    across = _across(normal, chord)
+    across = (turning @ chord[:, :, None])[:, :, 0]
     arc_angle = chain.arc_angle[first:last, None]
     done, rate, done_by, log_rate_by = _profiles(chain, t, first, last)
 
@@ -197,7 +195,7 @@ def linearise(chain: Chain, t: Array, first: int, last: int) -> Linearisation:
         return along[:, None] * chord[:, :, None] + sideways[:, None] * across[:, :, None]
 
     # Derivatives of k are k times those of ln k.
-    k = 1.0 / _sinc(0.5 * arc_angle)
+    k = 1.0 / np.sinc(0.5 * arc_angle / math.pi)
     k_log_slope = _log_slope(arc_angle)
     lag = done - 0.5
     cos, sin = k * np.cos(arc_angle * lag), k * np.sin(arc_angle * lag)
@@ -267,21 +265,7 @@ def _turning(normal: Array, dim: int) -> Array:
     """The matrices that turn a chord by 90 degrees about the normals, (strokes or 1, dim, dim)."""
     if dim == 2:
         return np.array([[[0.0, -1.0], [1.0, 0.0]]])
-    x, y, z = normal.T
-    o = np.zeros_like(x)
-    return np.array([[o, -z, y], [z, o, -x], [-y, x, o]]).transpose(2, 0, 1)
-
-
-def _across(normal: Array, chord: Array) -> Array:
-    """The vectors n x c, (strokes, dim)."""
-    if chord.shape[1] == 2:
-        return np.column_stack((-chord[:, 1], chord[:, 0]))
-    return np.cross(normal, chord)
-
-
-def _sinc(angle: Array) -> Array:
-    nonzero = np.where(angle == 0.0, 1e-20, angle)
-    return np.sin(nonzero) / nonzero
+    return np.cross(normal[:, None], np.eye(3)).swapaxes(1, 2)
 
 
 def _log_slope(arc_angle: Array, straight: float = _STRAIGHT) -> Array:
@@ -296,7 +280,7 @@ def _arc_integrals(
 ) -> tuple[Array, Array, Array, Array]:
     """The integrals k C and k S, and k dC/dd and k dS/dd; cos and sin are those of the tangent, times k."""
     half = 0.5 * arc_angle
-    reach = k * done * _sinc(half * done)
+    reach = k * done * np.sinc(half * done / math.pi)
     angle = half * done - half
     c, s = reach * np.cos(angle), reach * np.sin(angle)
     small = np.abs(arc_angle) < _STRAIGHT
@@ -376,9 +360,8 @@ def _data_equations(chain: Chain, goal: Goal) -> _Equations:
     error = 0.0
     for rows, first, last in pieces:
         model = linearise(chain, signal.t[rows], first, last)
-        left = np.stack(
-            ((signal.p[rows] - model.p).T * goal.p_scale, (signal.v[rows] - model.v).T * goal.v_scale)
-        ).reshape(-1)
+        p_left, v_left = signal.p[rows] - model.p, signal.v[rows] - model.v
+        left = np.concatenate((goal.p_scale * p_left.T, goal.v_scale * v_left.T)).ravel()
         model.jacobian[:, 0] *= goal.p_scale
         model.jacobian[:, 1] *= goal.v_scale
         flat = model.jacobian.reshape(len(model.jacobian), -1)

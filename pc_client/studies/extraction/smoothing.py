@@ -77,10 +77,9 @@ def speed_peaks(part: Trace) -> NDArray[np.intp]:
     All of them count that rise by more than `_PROMINENCE` of the part's top speed above the higher of the two
     valleys beside them. The first and the last sample are no maxima, however high.
     """
-    speed = part.speed
-    peaks, _ = find_peaks(speed, prominence=_PROMINENCE * float(speed.max()))
-    found: NDArray[np.intp] = peaks
-    return found
+    peaks: NDArray[np.intp]
+    peaks, _ = find_peaks(part.speed, prominence=_PROMINENCE * float(part.speed.max()))
+    return peaks
 
 
 def _interpolated(part: PenPart, t: Array) -> Array:
