@@ -19,7 +19,7 @@ from pc_client.kinematics.model import robot_model
 from pc_client.movements.movement import load_movement
 from pc_client.recording.recording import load_recording
 from pc_client.studies.drawing import figures
-from pc_client.studies.drawing.figures import sheets_of
+from pc_client.studies.drawing.figures import figures_of
 
 
 @pytest.fixture
@@ -33,7 +33,7 @@ def test_drawings_become_recordings_tables_and_a_page_with_a_section_each(
     robot, tmp_path, capsys, monkeypatch
 ):
     # One of the three figures: the others are drawn by `test_drawing_judgement`.
-    monkeypatch.setattr(figures, "sheets_of", lambda shown: {"paths": sheets_of(shown)["paths"]})
+    monkeypatch.setattr(figures, "figures_of", lambda shown: {"paths": figures_of(shown)["paths"]})
     archive, out, saved = tmp_path / "two.zip", tmp_path / "out", tmp_path / "one.toml"
     with zipfile.ZipFile(archive, "w") as packed:
         for folder in "ab":
