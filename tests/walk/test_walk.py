@@ -5,7 +5,6 @@ from walk import make_walk, walk
 from walk_box import KINDS
 
 
-
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "length"),
