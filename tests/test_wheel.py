@@ -183,7 +183,7 @@ def test_the_page_of_the_index_is_the_readme(wheel):
     facts = metadata(wheel)
     assert facts["Description-Content-Type"] == "text/markdown"
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    assert facts.get_payload().strip() == PAGE_FOR_INDEX(readme).strip()
+    assert facts.get_payload(decode=True).decode().strip() == PAGE_FOR_INDEX(readme).strip()
 
 
 def requirements(wanted, wheel):
