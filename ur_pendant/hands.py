@@ -21,12 +21,11 @@ from pc_client.driver.questions import ask_dashboard
 from pc_client.driver.rtde import RtdeStream, RtdeValues
 from pc_client.driver.transport import TcpNetwork
 from pc_client.errors import ClientError
-from protocol.rtde.types import RtdeValue
 from protocol.ur_types import ProgramState, RobotMode, SoftwareVersion
 from ur_emulator.errors import EmulatorError
 from ur_emulator.host.control_api.http_client import ControlClient
 from ur_emulator.host.control_api.operations import make
-from ur_pendant.robot import Robot
+from ur_pendant.robot import Robot, numbers
 
 
 class HandError(Exception):
@@ -87,7 +86,6 @@ class Hands:
         self._robot = robot
         self._follower: Follower | None = None
         self._moves = False
-        self._lock = threading.Lock()
 
     # --- keys of a pendant
 
@@ -161,16 +159,15 @@ class Hands:
         """
         self._check()
         goal = tuple(map(float, q))
-        with self._lock:
-            if self._robot.info is not None and self._robot.info.lockstep:
-                if not (self._moves and self._robot.program in ("", _MOVE)):
-                    _check_rest(self._robot.values)
-                self.run(f"def {_MOVE}():\n  movej({list(goal)}, a={ACCELERATION}, v={SPEED})\nend")
-                self._moves = True
-            elif self._follower is None or not self._follower.take(goal):
-                if self._follower is not None:
-                    self._follower.join()
-                self._follower = Follower(self._robot, self.run, goal)
+        if self._robot.info is not None and self._robot.info.lockstep:
+            if not (self._moves and self._robot.program in ("", _MOVE)):
+                _check_rest(self._robot.values)
+            self.run(f"def {_MOVE}():\n  movej({list(goal)}, a={ACCELERATION}, v={SPEED})\nend")
+            self._moves = True
+        elif self._follower is None or not self._follower.take(goal):
+            if self._follower is not None:
+                self._follower.join()
+            self._follower = Follower(self._robot, self.run, goal)
 
     @property
     def goal(self) -> Array | None:
@@ -212,7 +209,7 @@ class Follower:
                 _check_rest(values)
                 # The program must find where the arm is, not the targets of the last time.
                 for counter in (1, 2):
-                    stream.send((counter, *_six(values["target_q"])))
+                    stream.send((counter, *numbers(values, "target_q")))
                     stream.receive()
                 run(_program(first))
             except ClientError as error:
@@ -247,7 +244,9 @@ class Follower:
                 runs = values["runtime_state"] == ProgramState.PLAYING
                 with self._lock:
                     goal = self.goal
-                    is_there = not runs or np.abs(np.subtract(goal, _six(values["target_q"]))).max() < _THERE
+                    is_there = (
+                        not runs or np.abs(np.subtract(goal, numbers(values, "target_q"))).max() < _THERE
+                    )
                     resting = resting + 1.0 / _RATE if is_there and goal == last else 0.0
                     self._is_ending = resting >= _REST if runs else has_run or resting > _START
                 if self._is_ending:
@@ -281,7 +280,3 @@ def _program(register: int) -> str:
     for name, number in numbers.items():
         text = text.replace(name, str(number))
     return text
-
-
-def _six(value: RtdeValue) -> tuple[float, ...]:
-    return tuple(map(float, value)) if isinstance(value, tuple) else ()

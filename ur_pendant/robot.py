@@ -52,6 +52,8 @@ _HISTORY = 60.0
 """How long signals are kept [s]."""
 
 _LOG_LINES = 200
+_LONGEST = 160
+"""Of a text that is shown [characters]."""
 
 
 class Signal(NamedTuple):
@@ -282,3 +284,15 @@ def _line_of(message: RobotMessage) -> str | None:
         case PopupMessage():
             return f"{message.title}: {message.text}"
     return None
+
+
+def numbers(values: RtdeValues, name: str) -> tuple[float, ...]:
+    """Return a signal as numbers; none if it is not reported."""
+    value = values.get(name, ())
+    return tuple(map(float, value)) if isinstance(value, tuple) else (float(value),)
+
+
+def plain(text: str) -> str:
+    """Return text on one line, without what does not print, and cut."""
+    cut = text[:_LONGEST] + "…" * (len(text) > _LONGEST)
+    return cut if cut.isprintable() else "".join(c if c.isprintable() else " " for c in cut)

@@ -1,36 +1,43 @@
 """The page of a window: where it listens, and who may open it.
 
 viser serves the page and its websocket on one port. It looks neither at the `Origin` of a connection nor at
-its `Host`, listens on the next port when one is taken, and can publish a page through its maker's servers.
-The websockets library underneath is asked to look first, and to listen on the socket that was opened here;
-nothing is published.
+its `Host`, listens on the next port when one is taken, and can publish a page through its maker's servers. So
+it listens on an inner port, behind a gate that looks at each request before it passes the connection on. It
+takes no websocket that did not come through the gate, and nothing is published.
 """
 
 from __future__ import annotations
 
+import asyncio
 import http
-import logging
 import re
 import socket
-from collections.abc import Callable
+from contextlib import redirect_stdout, suppress
 from hashlib import sha256
 from http.cookies import SimpleCookie
-from secrets import compare_digest
+from secrets import compare_digest, token_hex
+from threading import Thread
 from typing import Any
-from unittest.mock import patch
 from urllib.parse import parse_qs, urlsplit
 
 import numpy as np
-import rich
 import viser
-import websockets.asyncio.server
-from websockets.datastructures import Headers
-from websockets.http11 import Request, Response
+from websockets.datastructures import MultipleValuesError
+from websockets.http11 import Request
+from websockets.server import ServerProtocol
 
+from ur_emulator.errors import EmulatorError
 from ur_emulator.host.box_options import check_token, is_loopback
+from ur_pendant.events import Events
 
 MOST_PAGES = 20
 """Pages that may be open at once."""
+
+_LONGEST, _PATIENCE = 1 << 14, 10.0  # of a request [bytes], and until it is there [s]
+_NO_REQUEST = (OSError, asyncio.IncompleteReadError, asyncio.LimitOverrunError, MultipleValuesError)
+_CHUNK = 1 << 16  # bytes
+_PASSED = "X-Ur-Pendant-Passed"
+"""Header with which the gate passes a request on."""
 
 _LOOK_AT = (0.2, 0.0, 0.3)
 _NARROW, _BELOW = 600, 0.8  # pixels, m
@@ -44,11 +51,132 @@ class WindowError(Exception):
 
 
 class PageServer(viser.ViserServer):  # type: ignore[misc]  # viser has no types that mypy can use
-    """viser's server that nobody can ask to publish the page."""
+    """viser's server behind a gate, which nobody can ask to publish the page.
+
+    Attributes:
+        events: what happens at its pages.
+    """
+
+    def __init__(self, listening: socket.socket, token: str | None, title: str) -> None:
+        """Serve pages that connect to the socket."""
+        self.events = Events()
+        self._address = listening.getsockname()
+        with redirect_stdout(None):  # viser tells what the caller tells better
+            super().__init__(host="127.0.0.1", port=0, label=title, verbose=False)
+        self._gate = _Gate(listening, super().get_port(), token)
+        self._websock_server.on_client_connect(self._check_passed)
+        self._websock_server.disconnect_all_clients()
+        self.gui.configure_theme(show_logo=False, show_share_button=False)
+        # Shadows and a sky of pictures take most of a core where there is no graphics card.
+        self.scene.configure_default_lights(cast_shadow=False)
+        self.scene.configure_environment_map(None)
+        self.scene.add_light_hemisphere("/sky", ground_color=(150, 150, 160), intensity=2.5)
+        self.gui.main_panel.dock_right()
+        self.initial_camera.position, self.initial_camera.look_at = (1.5, -1.1, 0.9), _LOOK_AT
+        self.on_client_connect(self.events.entry(_look_below))
+
+    def get_host(self) -> str:
+        """Return the address of the gate."""
+        return str(self._address[0])
+
+    def get_port(self) -> int:
+        """Return the port of the gate."""
+        return int(self._address[1])
 
     def request_share_url(self, verbose: bool = True) -> str | None:
         """Do nothing: a box is not for the world."""
         return None
+
+    def disconnect_share_url(self) -> None:
+        """Do nothing: nothing was published."""
+
+    def stop(self) -> None:
+        """Close all pages."""
+        self._gate.stop()
+        with redirect_stdout(None):
+            super().stop()
+
+    async def _check_passed(self, page: Any) -> None:
+        """Refuse a websocket that did not come through the gate, before anything of it is read."""
+        connection = self._websock_server._live_connections[page.client_id]
+        if self._gate.secret not in connection.request.headers.get_all(_PASSED):
+            del self._websock_server._live_connections[page.client_id]
+            del self._websock_server._client_state_from_id[page.client_id]
+            raise ConnectionRefusedError("a websocket that did not come through the gate")
+
+
+def _look_below(client: viser.ClientHandle) -> None:
+    """Let a phone look below the arm, which is then above the panel."""
+    if client.camera.image_width < _NARROW:
+        client.camera.look_at = np.subtract(_LOOK_AT, (0.0, 0.0, _BELOW))
+
+
+class _Gate:
+    """Listens in a thread of its own, and passes those connections on whose request may go on."""
+
+    def __init__(self, listening: socket.socket, inner_port: int, token: str | None) -> None:
+        self.secret = token_hex()
+        self._inner_port, self._token, self._pages = inner_port, token, 0
+        self._loop, self._ended = asyncio.new_event_loop(), asyncio.Event()
+        self._thread = Thread(target=self._run, args=(listening,), daemon=True)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Listen no more, and close all connections."""
+        with suppress(RuntimeError):  # it has been stopped
+            self._loop.call_soon_threadsafe(self._ended.set)
+        self._thread.join()
+
+    def _run(self, listening: socket.socket) -> None:
+        with asyncio.Runner(loop_factory=lambda: self._loop) as runner:  # which ends all of its tasks
+            runner.run(self._listen(listening))
+
+    async def _listen(self, listening: socket.socket) -> None:
+        server = await asyncio.start_server(self._attend, sock=listening, limit=_LONGEST)
+        await self._ended.wait()
+        server.close()
+
+    async def _attend(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        """Look at the request of a connection, which has only one."""
+        try:
+            with suppress(*_NO_REQUEST):
+                async with asyncio.timeout(_PATIENCE):
+                    head = await reader.readuntil(b"\r\n\r\n")
+                protocol = ServerProtocol()
+                protocol.receive_data(head)
+                for request in protocol.events_received():
+                    assert isinstance(request, Request)
+                    is_page = request.headers.get("Upgrade", "").lower() == "websocket"
+                    is_full = is_page and self._pages >= MOST_PAGES
+                    if refusal := _refusal(request, self._token, is_page=is_page, is_full=is_full):
+                        protocol.send_response(protocol.reject(http.HTTPStatus.FORBIDDEN, f"{refusal}\n"))
+                        writer.writelines(protocol.data_to_send())
+                        continue
+                    self._pages += is_page
+                    try:
+                        await self._pass(head, reader, writer)
+                    finally:
+                        self._pages -= is_page
+        finally:
+            writer.close()
+
+    async def _pass(self, head: bytes, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        """Connect to the inner port, and pass everything on, with headers of the gate on both sides."""
+        inner_reader, inner_writer = await asyncio.open_connection("127.0.0.1", self._inner_port)
+        try:
+            inner_writer.write(head[:-2] + f"{_PASSED}: {self.secret}\r\n\r\n".encode())
+            writer.write(await inner_reader.readline() + _headers(self._token))
+            await asyncio.gather(_copy(reader, inner_writer), _copy(inner_reader, writer))
+        finally:
+            inner_writer.close()
+
+
+async def _copy(source: asyncio.StreamReader, sink: asyncio.StreamWriter) -> None:
+    with suppress(OSError):
+        while data := await source.read(_CHUNK):
+            sink.write(data)
+            await sink.drain()
+    sink.close()
 
 
 def open_server(host: str, port: int, token: str | None, title: str) -> PageServer:
@@ -64,7 +192,7 @@ def open_server(host: str, port: int, token: str | None, title: str) -> PageServ
     """
     try:
         check_token(token)
-    except Exception as error:
+    except EmulatorError as error:
         raise WindowError(str(error)) from None
     if not is_loopback(host) and token is None:
         raise WindowError(
@@ -80,66 +208,25 @@ def open_server(host: str, port: int, token: str | None, title: str) -> PageServ
             f"port {port} of {host} cannot be opened ({error.strerror}): give another --port or --listen "
             "(of `ur-emulator serve`: --window-port or --window-host)"
         ) from None
-    serve = websockets.asyncio.server.serve
-    pages: set[Any] = set()  # also those that have not said yet how they look at the scene
-
-    def serve_checked(
-        handler: Any, host: str, port: int, *, process_request: Callable[..., Any], **options: Any
-    ) -> Any:
-        def look_first(connection: Any, request: Request) -> Response | None:
-            refusal = _refusal(request, token, is_full=len(pages) >= MOST_PAGES)
-            if refusal is not None:
-                return refusal
-            response: Response | None = process_request(connection, request)
-            if response is not None:
-                response.headers.update(_headers(token))
-            return response
-
-        async def count(page: Any) -> None:
-            pages.add(page)
-            try:
-                await handler(page)
-            finally:
-                pages.remove(page)
-
-        return serve(count, sock=listening, process_request=look_first, logger=quiet, **options)
-
-    quiet = logging.getLogger(__name__)  # of connections that send what is no message
-    quiet.disabled = True
-    rich.get_console().quiet = True  # on which viser tells what the caller tells better
-    with patch.object(websockets.asyncio.server, "serve", serve_checked):
-        server = PageServer(host=host, port=port, label=title, verbose=False)
-    server.gui.configure_theme(show_logo=False, show_share_button=False)
-    # Shadows and a sky of pictures take most of a core where there is no graphics card.
-    server.scene.configure_default_lights(cast_shadow=False)
-    server.scene.configure_environment_map(None)
-    server.scene.add_light_hemisphere("/sky", ground_color=(150, 150, 160), intensity=2.5)
-    server.gui.main_panel.dock_right()
-    server.initial_camera.position, server.initial_camera.look_at = (1.5, -1.1, 0.9), _LOOK_AT
-    server.on_client_connect(_look_below)
-    return server
+    return PageServer(listening, token, title)
 
 
-def _look_below(client: viser.ClientHandle) -> None:
-    """Let a phone look below the arm, which is then above the panel."""
-    if client.camera.image_width < _NARROW:
-        client.camera.look_at = np.subtract(_LOOK_AT, (0.0, 0.0, _BELOW))
-
-
-def _refusal(request: Request, token: str | None, *, is_full: bool) -> Response | None:
-    """Return why a request is refused; None if it may go on."""
+def _refusal(request: Request, token: str | None, *, is_page: bool, is_full: bool) -> str:
+    """Return why a request is refused; "" if it may go on."""
     headers = request.headers
     host, origin = headers.get("Host", ""), headers.get("Origin")
     named = _HOST.fullmatch(host)
     if named is None or (token is None and not is_loopback(named[1].strip("[]"))):
-        return _refuse(f"host {ascii(host)[:60]} given: open the page by 127.0.0.1 or localhost")
+        return f"host {ascii(host)[:60]} given: open the page by 127.0.0.1 or localhost"
     if origin is not None and origin != f"http://{host}":
-        return _refuse(f"pages of {ascii(origin)[:60]} may not use this window")
+        return f"pages of {ascii(origin)[:60]} may not use this window"
     if token is not None and not _shows(request, token):
-        return _refuse("this window needs its token: open it as /?token=...")
-    if is_full and headers.get("Upgrade", "").lower() == "websocket":
-        return _refuse(f"{MOST_PAGES} pages are open: close one")
-    return None
+        return "this window needs its token: open it as /?token=..."
+    if is_full:
+        return f"{MOST_PAGES} pages are open: close one"
+    if is_page and f"viser-v{viser.__version__}" not in headers.get("Sec-WebSocket-Protocol", ""):
+        return "the page is of another version of viser: load it again"
+    return ""
 
 
 def _shows(request: Request, token: str) -> bool:
@@ -154,15 +241,9 @@ def _digest(token: str) -> str:
     return sha256(token.encode()).hexdigest()
 
 
-def _refuse(text: str) -> Response:
-    body = f"{text}\n".encode()
-    headers = Headers({"Content-Type": "text/plain; charset=utf-8", "Content-Length": str(len(body))})
-    return Response(http.HTTPStatus.FORBIDDEN, "Forbidden", headers, body)
-
-
-def _headers(token: str | None) -> dict[str, str]:
-    """What the page's answers say beside viser's own: no other page may show it, and the token is kept."""
-    said = {"X-Frame-Options": "SAMEORIGIN", "Referrer-Policy": "no-referrer", "Cache-Control": "no-cache"}
+def _headers(token: str | None) -> bytes:
+    """What answers say beside viser's own: no other page may show this one, and the token is kept."""
+    said = "X-Frame-Options: SAMEORIGIN\r\nReferrer-Policy: no-referrer\r\nCache-Control: no-cache\r\n"
     if token is not None:
-        said["Set-Cookie"] = f"{_COOKIE}={_digest(token)}; HttpOnly; SameSite=Strict; Path=/"
-    return said
+        said += f"Set-Cookie: {_COOKIE}={_digest(token)}; HttpOnly; SameSite=Strict; Path=/\r\n"
+    return said.encode()

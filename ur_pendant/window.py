@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import os
 import signal
 import sys
@@ -30,7 +31,7 @@ from ur_pendant.server import PageServer, WindowError, open_server
 _BESIDE = 1.3
 """From one arm to the next in a window of several [m]."""
 
-Update = Callable[[], None]
+Update = Callable[[], object]
 
 
 def show_robots(
@@ -78,29 +79,33 @@ def show_recordings(files: Sequence[str], save: str | None, port: int) -> None:
 
 
 def _serve(server: PageServer, updates: list[Update]) -> None:
-    """Say where the window is, and update it thirty times a second until the process is interrupted."""
+    """Say where the window is; update it thirty times a second and take its events until an interrupt."""
+    logging.getLogger("websockets.server").disabled = True  # what pages send may be no message
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # as Ctrl-C: `serve` ends its window with it
     with suppress(KeyboardInterrupt):
         _announce(server)
         while updates:
-            begun = time.monotonic()
+            end = time.monotonic() + 1.0 / RATE
             with server.atomic():
                 for update in list(updates):
-                    _try(update, updates)
-            time.sleep(max(0.0, 1.0 / RATE - (time.monotonic() - begun)))
+                    if not _try(update, "a part of the window is shown no more"):
+                        updates.remove(update)
+            for handle in server.events.until(end):
+                _try(handle, "an event of a page has no effect")
     # Ctrl-C reaches this process and `serve`, which then ends it, too: once is enough.
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
     server.stop()
 
 
-def _try(update: Update, updates: list[Update]) -> None:
-    """Update a part; what one robot sends must not end the window on the others."""
+def _try(update: Update, consequence: str) -> bool:
+    """Whether it could be done; what one robot sends, or a page, must not end the window on the others."""
     try:
         update()
     except Exception as error:
-        updates.remove(update)
-        _complain(f"a part of the window is shown no more: {type(error).__name__}: {error}")
+        _complain(f"{consequence}: {type(error).__name__}: {error}")
+        return False
+    return True
 
 
 def _announce(server: PageServer) -> None:

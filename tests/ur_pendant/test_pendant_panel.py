@@ -1,16 +1,15 @@
 """The panel on a real server of viser, whose callbacks are called as viser does it; robot and hands are recorded."""
 
-import asyncio
 from collections import deque
+from concurrent.futures import Future
+from contextlib import suppress
 from dataclasses import replace
-from threading import Event
 from time import sleep
 from types import SimpleNamespace
 
 import numpy as np
 import pinocchio as pin
 import pytest
-import viser
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -26,22 +25,11 @@ from ur_emulator.machine.commands.surroundings import MAX_FORCE
 from ur_emulator.machine.models.things import BodyShape, ThingNow
 from ur_pendant import hands
 from ur_pendant.drawing import RobotDrawing
+from ur_pendant.guiding import AHEAD, JUMP, STIFFNESS, jogged, pulled, reached
 from ur_pendant.hands import HandError
-from ur_pendant.panel import (
-    AHEAD,
-    FREEDRIVE,
-    JUMP,
-    LINES,
-    ROWS,
-    STIFFNESS,
-    Panel,
-    columns,
-    jogged,
-    plain,
-    pulled,
-    reached,
-)
-from ur_pendant.robot import PLOTTED, Address, LogLine, Robot, Sample
+from ur_pendant.panel import FREEDRIVE, LINES, ROWS, Panel, columns
+from ur_pendant.robot import PLOTTED, Address, LogLine, Robot, Sample, plain
+from ur_pendant.server import open_server
 
 Q = (0.3, -1.7, -2.0, -0.2, 1.4, 1.8)
 ZEROS = (0.0,) * 6
@@ -130,6 +118,22 @@ def a_state(**changes):
     )
 
 
+class Threads:
+    """In place of a pool of threads: does what it was given when it is told to."""
+
+    def __init__(self, *_):
+        self.given = []
+
+    def submit(self, errand, *arguments):
+        self.given.append((errand, arguments, Future()))
+        return self.given[-1][2]
+
+    def run(self):
+        for errand, arguments, future in self.given:
+            future.set_result(errand(*arguments))
+        self.given = []
+
+
 class Window:
     """A panel, its controls by label, and somebody at a page."""
 
@@ -139,9 +143,14 @@ class Window:
         self.panel = Panel(server, robot, hands, self.drawing)
         self.update()
 
+    @property
+    def guiding(self):
+        return self.panel._controls._guiding
+
     def update(self):
         self.drawing.update()
-        self.panel._refreshed = 0.0
+        if self.panel._controls is not None:
+            self.panel._controls._refreshed = 0.0
         self.panel.update()
 
     def controls(self):
@@ -153,33 +162,62 @@ class Window:
     def control(self, label):
         return next(handle for handle in self.controls() if handle.label == label)
 
-    def event(self, handle, **more):
-        return SimpleNamespace(client=self.client, client_id=1, target=handle, **more)
+    def happens(self, callbacks, handle, **more):
+        """Call what viser calls, in the thread of its loop."""
+        event = SimpleNamespace(client=self.client, client_id=1, target=handle, **more)
+        for callback in callbacks:
+            with suppress(StopIteration):
+                callback(event).send(None)
 
     def use(self, label, value=True):
-        handle = self.control(label)
+        self.choose(self.control(label), value)
+
+    def choose(self, handle, value):
         handle._impl.value = value
-        for callback in handle._impl.update_cb:
-            callback(self.event(handle))
+        self.happens(handle._impl.update_cb, handle)
         self.work()
 
     def hold(self, label):
         handle = self.control(label)
         for callbacks in handle._impl.hold_cbs_from_freq.values():
-            for callback in callbacks:
-                callback(self.event(handle))
+            self.happens(callbacks, handle)
         self.work()
 
+    def take(self):
+        """Let the window's thread take all events."""
+        while not self.server.events._queue.empty():
+            self.server.events._queue.get()()
+
     def work(self):
-        """Let the panel's worker do what it was asked for."""
-        self.panel._worker.submit(int).result()
+        """Let errands be done, too."""
+        self.take()
+        while self.lane.given or self.others.given:
+            self.others.run()
+            self.lane.run()
+            self.take()
+
+    @property
+    def lane(self):
+        return self.panel._make.args[5]._lane
+
+    @property
+    def others(self):
+        return self.panel._make.args[5]._others
+
+
+@pytest.fixture(scope="module")
+def page():
+    server = open_server("127.0.0.1", 0, None, "test")
+    yield server
+    server.stop()
 
 
 @pytest.fixture
-def server():
-    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
-    yield server
-    server.stop()
+def server(page, monkeypatch):
+    monkeypatch.setattr("ur_pendant.events.ThreadPoolExecutor", Threads)
+    yield page
+    page.gui.reset()
+    page.scene.reset()
 
 
 @pytest.fixture
@@ -194,7 +232,7 @@ def test_a_robot_that_is_not_held_has_values_and_no_controls_until_it_is(server)
     assert window.control("Mode").value == "RUNNING"
     free = {"Pause", "Signal", "Filter"}  # of the page only
     assert all(handle.disabled for handle in window.controls() if handle.label not in free)
-    assert window.panel._nodes == []
+    assert window.guiding is None
     assert not window.drawing.arm.links[-1]._has_any_drag_callbacks()
     robot.is_held = True
     window.update()
@@ -230,11 +268,10 @@ def test_every_key_does_what_it_says_where_the_robot_has_it(server, major, has_a
                 handle for handle in window.controls() if handle.label == label and hasattr(handle, "options")
             )
             for option in deeds:
-                row._impl.value = option
-                row._impl.update_cb[0](window.event(row))
+                window.choose(row, option)
     pressed = {name for kind, name in (what for what in hands.done if len(what) == 2) if kind == "press"}
     assert len(pressed) == 9
-    assert ("emergency_stop", {}) in hands.done if has_api else all(kind == "press" for kind, _ in hands.done)
+    assert has_api or all(kind == "press" for kind, _ in hands.done)
     assert (("enabling_device", {"position": "fully pressed"}) in hands.done) == (has_api and major >= 5)
 
 
@@ -297,13 +334,13 @@ def test_the_world(window):
     thing = {"name": "can", "shape": "cylinder", "size": size, "pose": pose, "mass": 0.5}
     assert window.hands.done.pop() == ("add_thing", thing)
     window.use("Show the place")
-    (place,) = (node for node in window.panel._nodes if node.name.endswith("/place"))
+    place = window.server.scene.get_handle_by_name("/robot0/place")
     assert place.visible
     window.use("At m", (0.1, 0.2, 0.3))
     assert tuple(place.position) == (0.1, 0.2, 0.3)
     place.position = (0.30001, 0.2, 0.3)
-    for callback in place._impl_aux.update_cb:
-        callback(window.event(place))
+    window.happens(place._impl_aux.update_cb, place, phase="update")
+    window.work()
     assert window.control("At m").value == (0.3, 0.2, 0.3)
     window.use("Hang load on the flange")
     assert window.hands.done.pop() == ("attach_payload", {"mass": 0.5})
@@ -371,10 +408,8 @@ def test_popups_and_questions_until_they_are_gone(window):
     emergency = window.control("Emergency")
     text = window.control("Text")
     container = window.server.gui._container_handle_from_uuid[text._impl.parent_container_id]
-    assert emergency.order < container.order < window.panel._tabs.order
-    row = window.controls()[-1]
-    row._impl.value = "Close popup"
-    row._impl.update_cb[0](window.event(row))
+    assert emergency.order < container.order < window.panel._controls._tabs.order
+    window.choose(window.controls()[-1], "Close popup")
     assert window.hands.done.pop() == ("press", "Close popup")
     robot.popups = ()
     window.update()
@@ -391,11 +426,12 @@ def test_a_button_that_is_held_moves_a_joint_and_its_release_stops_it(window):
     steps = [what[1][2] - Q[2] for what in window.hands.done]
     assert steps == pytest.approx([0.06, 0.12, AHEAD])
     window.robot.values = {**window.robot.values, "target_qd": (0.0, 0.0, 0.6, 0.0, 0.0, 0.0)}
-    window.panel._jogging = 1e-9  # when it was heard
+    window.guiding._heard = 0.0
     window.update()
     window.work()
     assert window.hands.done[-1][1][2] - Q[2] == pytest.approx(0.036 + 0.12)
-    assert window.panel._jogging == 0.0
+    window.update()
+    assert window.lane.given == []
 
 
 @pytest.mark.parametrize("label", ["base +", "Go there"])
@@ -431,23 +467,25 @@ def test_jogging_keeps_near_and_within_the_limits(goal, q, joint, step):
 
 
 def drag(window, phase, T):
-    gizmo = window.panel._gizmo
-    gizmo._impl.position = T[:3, 3]
-    asyncio.run(window.panel._on_drag(window.event(gizmo, phase=phase)))
-    window.update()
-    window.work()
+    gizmo = window.guiding.frame
+    gizmo._impl.position, gizmo._impl.wxyz = T[:3, 3], np.roll(pin.Quaternion(T[:3, :3]).coeffs(), 1)
+    window.happens(gizmo._impl_aux.update_cb, gizmo, phase=phase)
 
 
 def test_the_tool_goes_where_its_frame_is_dragged(window):
-    gizmo, start = window.panel._gizmo, window.drawing.T_base_tcp
+    gizmo, start = window.guiding.frame, window.drawing.T_base_tcp
     assert gizmo.visible
     assert gizmo.position == pytest.approx(start[:3, 3])
     drag(window, "start", start)
+    window.work()
     assert window.hands.done == []
     T = start.copy()
     for _ in range(4):
         T[2, 3] += 0.02
         drag(window, "update", T)
+        window.work()
+        window.update()
+        assert gizmo.position == pytest.approx(T[:3, 3])  # in the hand, not where the robot is
     found = tcp_pose(MODEL, window.hands.goal) @ pose_to_T(window.robot.values["tcp_offset"])
     assert found == pytest.approx(T, abs=1e-5)
     far = T.copy()
@@ -455,13 +493,15 @@ def test_the_tool_goes_where_its_frame_is_dragged(window):
         far[0, 3] = x
         drag(window, "update", far)
     drag(window, "end", far)
+    window.work()
+    window.update()
     assert len(window.hands.done) == 4
     assert len(window.client.told) == 1
     assert gizmo.position == pytest.approx(start[:3, 3])  # where the robot still is
 
 
 def test_no_frame_to_drag_while_a_program_has_the_arm(window):
-    gizmo, values = window.panel._gizmo, window.robot.values
+    gizmo, values = window.guiding.frame, window.robot.values
     for mode, program, goal, is_there in (
         (RobotMode.RUNNING, ProgramState.PLAYING, None, False),
         (RobotMode.RUNNING, ProgramState.PLAYING, np.array(Q), True),  # the window's own
@@ -488,31 +528,42 @@ def test_no_pose_is_reached_by_a_jump_or_beyond_a_limit():
         reached(MODEL, tcp_pose(MODEL, at_limit + 0.05 * np.eye(6)[5]), at_limit)
 
 
-def test_the_last_pose_of_a_drag_is_reached_however_busy_the_worker_is(window):
+@pytest.mark.parametrize("frames", [0, 1])
+def test_the_last_pose_of_a_drag_arrives_however_busy_window_and_robot_are(window, frames):
     """Poses come faster than the arm is told; each lies too far from the first to be reached from there."""
-    gizmo, posture = window.panel._gizmo, np.array(Q)
-    tcp = pose_to_T(window.robot.values["tcp_offset"])
-    is_busy = Event()
-    window.panel._worker.submit(is_busy.wait)
-    for step in range(9):
+    posture, tcp = np.array(Q), pose_to_T(window.robot.values["tcp_offset"])
+    drag(window, "start", tcp_pose(MODEL, posture) @ tcp)
+    for step in range(1, 9):
         T = tcp_pose(MODEL, posture + 0.2 * step * np.eye(6)[0]) @ tcp
-        phase = "start" if step == 0 else "end" if step == 8 else "update"
-        gizmo._impl.position, gizmo._impl.wxyz = T[:3, 3], np.roll(pin.Quaternion(T[:3, :3]).coeffs(), 1)
-        asyncio.run(window.panel._on_drag(window.event(gizmo, phase=phase)))
-    asyncio.run(window.panel._on_drag(window.event(gizmo, phase="start")))  # and it is taken again at once
-    window.update()
-    is_busy.set()
+        drag(window, "end" if step == 8 else "update", T)
+        for _ in range(frames):
+            window.take()
+            window.update()
+    drag(window, "start", tcp_pose(MODEL, posture) @ tcp)  # and it is taken again at once
     window.work()
-    assert [what[0] for what in window.hands.done] == ["follow"]
+    assert len(window.hands.done) == 2  # the first, and what came last while it was done
     assert window.hands.goal == pytest.approx(posture + 1.6 * np.eye(6)[0], abs=1e-4)
 
 
+def test_the_emergency_stop_waits_for_nothing(window):
+    """The window's thread takes nothing, the robot does not answer, and a second click comes at once."""
+    window.hands.operate = lambda operation: window.hands.done.append(operation)
+    window.happens(window.control("Power")._impl.update_cb, window.control("Power"))
+    row = window.control("Emergency")
+    for button in ("Emergency stop", "Release"):
+        row._impl.value = button
+        window.happens(row._impl.update_cb, row)
+    while len(window.hands.done) < 2:
+        sleep(0.001)
+    assert set(window.hands.done) == {"emergency_stop", "release_emergency_stop"}
+
+
 def pull(window, phase, start, end, link=-1):
-    event = window.event(
-        window.drawing.arm.links[link], phase=phase, start_position=tuple(start), end_position=tuple(end)
-    )
-    asyncio.run(window.panel._on_pull(event))
-    window.panel._pushed = 0.0
+    node = window.drawing.arm.links[link]
+    more = {"phase": phase, "start_position": tuple(start), "end_position": tuple(end)}
+    window.happens([window.guiding._enter_pull], node, **more)
+    window.take()
+    window.guiding._pushed = 0.0
     window.update()
     window.work()
 
@@ -521,7 +572,7 @@ def test_the_arm_is_pushed_where_the_mouse_takes_it(window):
     flange = window.drawing.arm.T_base_flange
     at = flange[:3, 3] + flange[:3, :3] @ (0.02, -0.03, 0.1)
     pull(window, "start", at, np.add(at, (0.0, 0.1, 0.0)))
-    (name, given), arrow = window.hands.done.pop(), window.panel._arrow
+    (name, given), arrow = window.hands.done.pop(), window.guiding.arrow
     assert name == "push"
     assert given["force"] == pytest.approx((0.0, 0.1 * STIFFNESS, 0.0))
     assert given["duration"] == 0.3
@@ -537,7 +588,7 @@ def test_the_arm_is_pushed_where_the_mouse_takes_it(window):
 def test_what_cannot_be_pushed_is_not_pushed_elsewhere(window):
     pull(window, "start", (0.0, 0.0, 0.1), (0.5, 0.0, 0.1), link=2)
     assert window.client.told.pop()[1] == "pull at the last link or at the tool: a box is pushed there"
-    assert not window.panel._arrow.visible
+    assert not window.guiding.arrow.visible
     pull(window, "start", (0.0, 0.0, 0.0), (9.0, 0.0, 0.0))  # at the end of a tool that is as long
     assert "at most 0.3 m" in window.client.told.pop()[1]
     assert window.hands.done == []
@@ -600,6 +651,7 @@ def test_a_real_box_is_held(server):
             window = Window(server, robot, hands.Hands(robot))
             assert window.control("Robot").value.startswith("UR5e")
             window.use("Emergency", "Emergency stop")
+            box.wait_until(safety_mode="ROBOT_EMERGENCY_STOP", timeout=20.0)
             assert box.state.safety_mode == "ROBOT_EMERGENCY_STOP", window.client.told
         finally:
             robot.close()
