@@ -74,7 +74,7 @@ class Errands:
     def ask(self, client: Any, errand: Errand, kind: str = "") -> None:
         """Have an errand done; `client` is told what the robot says to it.
 
-        Errands with a kind follow each other; one that waits gives way to a newer one of its kind, so that the
+        Errands with a kind follow each other, and one that waits gives way to a newer one of its kind: the
         last is never lost, nor late. Others wait for none of them.
         """
         if kind:

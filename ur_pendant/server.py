@@ -22,6 +22,7 @@ from urllib.parse import parse_qs, urlsplit
 
 import numpy as np
 import viser
+from viser._messages import ShareUrlDisconnect, ShareUrlRequest
 from websockets.datastructures import MultipleValuesError
 from websockets.http11 import Request
 from websockets.server import ServerProtocol
@@ -51,19 +52,22 @@ class WindowError(Exception):
 
 
 class PageServer(viser.ViserServer):  # type: ignore[misc]  # viser has no types that mypy can use
-    """viser's server behind a gate, which nobody can ask to publish the page.
+    """viser's server behind a gate, which looks at the request of each connection.
 
     Attributes:
+        address: of the gate: host and port.
         events: what happens at its pages.
     """
 
     def __init__(self, listening: socket.socket, token: str | None, title: str) -> None:
         """Serve pages that connect to the socket."""
+        self.address: tuple[str, int] = listening.getsockname()[:2]
         self.events = Events()
-        self._address = listening.getsockname()
+        self._token, self._pages, self._secret = token, 0, token_hex()
         with redirect_stdout(None):  # viser tells what the caller tells better
             super().__init__(host="127.0.0.1", port=0, label=title, verbose=False)
-        self._gate = _Gate(listening, super().get_port(), token)
+        for message in (ShareUrlRequest, ShareUrlDisconnect):  # a box is not for the world
+            self._websock_server.unregister_handler(message)
         self._websock_server.on_client_connect(self._check_passed)
         self._websock_server.disconnect_all_clients()
         self.gui.configure_theme(show_logo=False, show_share_button=False)
@@ -74,70 +78,39 @@ class PageServer(viser.ViserServer):  # type: ignore[misc]  # viser has no types
         self.gui.main_panel.dock_right()
         self.initial_camera.position, self.initial_camera.look_at = (1.5, -1.1, 0.9), _LOOK_AT
         self.on_client_connect(self.events.entry(_look_below))
-
-    def get_host(self) -> str:
-        """Return the address of the gate."""
-        return str(self._address[0])
-
-    def get_port(self) -> int:
-        """Return the port of the gate."""
-        return int(self._address[1])
-
-    def request_share_url(self, verbose: bool = True) -> str | None:
-        """Do nothing: a box is not for the world."""
-        return None
-
-    def disconnect_share_url(self) -> None:
-        """Do nothing: nothing was published."""
+        self._gate, self._ended = asyncio.new_event_loop(), asyncio.Event()
+        self._thread = Thread(target=self._listen, args=(listening,), daemon=True)
+        self._thread.start()
 
     def stop(self) -> None:
         """Close all pages."""
-        self._gate.stop()
+        with suppress(RuntimeError):  # it has been stopped
+            self._gate.call_soon_threadsafe(self._ended.set)
+        self._thread.join()
         with redirect_stdout(None):
             super().stop()
 
     async def _check_passed(self, page: Any) -> None:
         """Refuse a websocket that did not come through the gate, before anything of it is read."""
         connection = self._websock_server._live_connections[page.client_id]
-        if self._gate.secret not in connection.request.headers.get_all(_PASSED):
+        if self._secret not in connection.request.headers.get_all(_PASSED):
             del self._websock_server._live_connections[page.client_id]
             del self._websock_server._client_state_from_id[page.client_id]
             raise ConnectionRefusedError("a websocket that did not come through the gate")
 
+    # --- the gate, in a thread of its own
 
-def _look_below(client: viser.ClientHandle) -> None:
-    """Let a phone look below the arm, which is then above the panel."""
-    if client.camera.image_width < _NARROW:
-        client.camera.look_at = np.subtract(_LOOK_AT, (0.0, 0.0, _BELOW))
+    def _listen(self, listening: socket.socket) -> None:
+        async def listen() -> None:
+            server = await asyncio.start_server(self._attend, sock=listening, limit=_LONGEST)
+            await self._ended.wait()
+            server.close()
 
-
-class _Gate:
-    """Listens in a thread of its own, and passes those connections on whose request may go on."""
-
-    def __init__(self, listening: socket.socket, inner_port: int, token: str | None) -> None:
-        self.secret = token_hex()
-        self._inner_port, self._token, self._pages = inner_port, token, 0
-        self._loop, self._ended = asyncio.new_event_loop(), asyncio.Event()
-        self._thread = Thread(target=self._run, args=(listening,), daemon=True)
-        self._thread.start()
-
-    def stop(self) -> None:
-        """Listen no more, and close all connections."""
-        with suppress(RuntimeError):  # it has been stopped
-            self._loop.call_soon_threadsafe(self._ended.set)
-        self._thread.join()
-
-    def _run(self, listening: socket.socket) -> None:
-        with asyncio.Runner(loop_factory=lambda: self._loop) as runner:  # which ends all of its tasks
-            runner.run(self._listen(listening))
-
-    async def _listen(self, listening: socket.socket) -> None:
-        server = await asyncio.start_server(self._attend, sock=listening, limit=_LONGEST)
-        await self._ended.wait()
-        server.close()
+        with asyncio.Runner(loop_factory=lambda: self._gate) as runner:  # which ends all of its tasks
+            runner.run(listen())
 
     async def _attend(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        """Look at the request of a connection, which has only one."""
+        """Look at the request of a connection, and pass the connection on if it may go on."""
         try:
             with suppress(*_NO_REQUEST):
                 async with asyncio.timeout(_PATIENCE):
@@ -161,14 +134,19 @@ class _Gate:
             writer.close()
 
     async def _pass(self, head: bytes, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        """Connect to the inner port, and pass everything on, with headers of the gate on both sides."""
-        inner_reader, inner_writer = await asyncio.open_connection("127.0.0.1", self._inner_port)
+        inner_reader, inner_writer = await asyncio.open_connection("127.0.0.1", self.get_port())
         try:
-            inner_writer.write(head[:-2] + f"{_PASSED}: {self.secret}\r\n\r\n".encode())
+            inner_writer.write(head[:-2] + f"{_PASSED}: {self._secret}\r\n\r\n".encode())
             writer.write(await inner_reader.readline() + _headers(self._token))
             await asyncio.gather(_copy(reader, inner_writer), _copy(inner_reader, writer))
         finally:
             inner_writer.close()
+
+
+def _look_below(client: viser.ClientHandle) -> None:
+    """Let a phone look below the arm, which is then above the panel."""
+    if client.camera.image_width < _NARROW:
+        client.camera.look_at = np.subtract(_LOOK_AT, (0.0, 0.0, _BELOW))
 
 
 async def _copy(source: asyncio.StreamReader, sink: asyncio.StreamWriter) -> None:

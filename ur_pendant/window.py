@@ -110,9 +110,9 @@ def _try(update: Update, consequence: str) -> bool:
 
 def _announce(server: PageServer) -> None:
     """Say where the window is; on a terminal, a line opens it."""
-    host = server.get_host()
+    host, port = server.address
     has_token = PAGE_TOKEN_VARIABLE in os.environ
-    url = f"http://{f'[{host}]' if ':' in host else host}:{server.get_port()}"
+    url = f"http://{f'[{host}]' if ':' in host else host}:{port}"
     on_terminal = not has_token and sys.stdin is not None and sys.stdin.isatty()
     more = "/?token=..." if has_token else "; press Enter to open it in the browser" if on_terminal else ""
     print(f"window at {url}{more}", flush=True)

@@ -2,8 +2,15 @@
 
 import http.client
 import socket
+from queue import SimpleQueue
+from time import monotonic
 
+import msgspec
 import pytest
+import viser
+from viser._messages import ShareUrlDisconnect, ShareUrlRequest
+from websockets.exceptions import ConnectionClosedError
+from websockets.sync.client import connect
 
 from ur_pendant.server import WindowError, open_server
 
@@ -24,7 +31,7 @@ def server():
 
 
 def get(server, path="/", **headers):
-    connection = http.client.HTTPConnection("127.0.0.1", server.get_port(), timeout=20)
+    connection = http.client.HTTPConnection(*server.address, timeout=20)
     connection.request("GET", path, headers=headers)
     answer = connection.getresponse()
     if answer.status == 101:
@@ -96,4 +103,50 @@ def test_other_addresses_need_a_token_and_a_taken_port_is_an_error(server):
 
 
 def test_nobody_can_publish_the_page(server):
-    assert server.request_share_url() is None
+    assert not {ShareUrlRequest, ShareUrlDisconnect} & set(server._websock_server._incoming_handlers)
+
+
+def page(address):
+    """A page's websocket, as its script opens it."""
+    host, port = address
+    return connect(
+        f"ws://{host}:{port}", subprotocols=[f"viser-v{viser.__version__}"], max_size=None, proxy=None
+    )
+
+
+def test_a_websocket_that_did_not_come_through_the_gate_is_closed_before_anything_is_sent(server):
+    with page(server.address) as one:
+        assert one.recv()
+    with page(("127.0.0.1", server.get_port())) as one, pytest.raises(ConnectionClosedError):
+        one.recv()
+
+
+def test_so_many_pages_may_be_open_at_once(server, monkeypatch):
+    monkeypatch.setattr("ur_pendant.server.MOST_PAGES", 2)
+    with page(server.address) as one, page(server.address) as other:
+        assert one.recv()
+        assert other.recv()
+        status, body, _ = get(server, **UPGRADE)
+        assert (status, body) == (403, "2 pages are open: close one\n")
+        assert get(server)[0] == 200
+
+
+def test_events_of_a_page_come_in_their_order_and_the_end_of_a_drag_with_its_pose(server):
+    frame = server.scene.add_transform_controls("/frame")
+    taken = SimpleQueue()
+    frame.on_update(server.events.entry(taken.put, lambda event: ((event.phase, event.target.position[0]),)))
+
+    def send(kind, **more):
+        one.send(msgspec.msgpack.encode({"type": kind, "name": "/frame", "owner": "", **more}))
+
+    with page(server.address) as one:
+        send("TransformControlsDragStartMessage")
+        for x in range(100):
+            send("TransformControlsUpdateMessage", wxyz=(1.0, 0.0, 0.0, 0.0), position=(float(x), 0.0, 0.0))
+        send("TransformControlsDragEndMessage")
+        for handle in server.events.until(monotonic() + 20.0):
+            handle()
+            if taken.qsize() == 102:
+                break
+    got = [taken.get() for _ in range(taken.qsize())]
+    assert got == [("start", 0.0), *(("update", float(x)) for x in range(100)), ("end", 99.0)]
