@@ -42,7 +42,6 @@ MAY_HAVE_EFFECTS = {
     "ur_pendant": {
         "robot.py",
         "hands.py",
-        "events.py",
         "guiding.py",
         "server.py",
         "panel.py",

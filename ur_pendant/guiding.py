@@ -8,9 +8,9 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Set
 from dataclasses import replace
-from enum import Enum, auto
+from enum import Enum
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -21,8 +21,7 @@ from protocol.pose import pose_inv, pose_to_T
 from protocol.ur_types import ProgramState, RobotMode
 from ur_emulator.machine.commands.surroundings import MAX_FORCE
 from ur_pendant.drawing import ArmDrawing, RobotDrawing
-from ur_pendant.events import Errands
-from ur_pendant.hands import ACCELERATION, HandError, Hands
+from ur_pendant.hands import ACCELERATION, Errands, HandError, Hands
 from ur_pendant.robot import Robot, numbers
 from ur_pendant.server import PageServer
 
@@ -35,13 +34,20 @@ STIFFNESS = 200.0  # Of the spring that pulls at the arm, as hard as a box can b
 _PUSH_EVERY, _PUSH_LASTS = 0.2, 0.3  # s
 
 
+class Workspace(NamedTuple):
+    """A robot of a window, what shows it, and what has something done to it."""
+
+    server: PageServer
+    robot: Robot
+    hands: Hands
+    drawing: RobotDrawing
+    errands: Errands
+
+
 class Hold(Enum):
     """How the arm is held."""
 
-    FREE = auto()
-    JOGGED = auto()
-    DRAGGED = auto()
-    PULLED = auto()
+    FREE, JOGGED, DRAGGED, PULLED = range(4)
 
 
 NEXT: Mapping[Hold, Mapping[str, Hold]] = {
@@ -79,29 +85,21 @@ def pulled(grip: Array, end: Array) -> Array:
 class Guiding:
     """A frame at the tool of an arm, to be dragged, an arrow where it is pulled, and what moves the arm."""
 
-    def __init__(
-        self,
-        server: PageServer,
-        robot: Robot,
-        hands: Hands,
-        errands: Errands,
-        drawing: RobotDrawing,
-        arm: ArmDrawing,
-    ) -> None:
-        self._robot, self._hands, self._errands = robot, hands, errands
-        self._drawing, self.arm = drawing, arm
+    def __init__(self, workspace: Workspace, arm: ArmDrawing) -> None:
+        server, self._robot, self._hands, self._drawing, self._errands = workspace
+        self.arm = arm
         self.hold = Hold.FREE
         self._heard = self._pushed = 0.0
         self._placed = np.zeros((4, 4))
         self._followed = np.empty(6)
         self._pull: Any = None
         self._grip = np.zeros(3)
-        name, scene = drawing.root.name, server.scene
+        name, scene = self._drawing.root.name, server.scene
         self.frame = scene.add_transform_controls(f"{name}/hand", 0.25, depth_test=False, visible=False)
         look = {"shaft_radius": 0.006, "head_radius": 0.014, "head_length": 0.03, "visible": False}
         self.arrow = scene.add_arrows(f"{name}/pull", np.zeros((1, 2, 3)), (230, 60, 160), **look)
         self.frame.on_update(server.events.entry(self._drag, _read_drag))
-        self._enter_pull = server.events.entry(self._take)
+        self._enter_pull = server.events.entry(self._take, lambda event: (event,))
         self._pullable: Set[str] = frozenset()
 
     def remove(self) -> None:
@@ -143,12 +141,12 @@ class Guiding:
         else:
             self.go(client, self._followed, "drag")
 
-    def _take(self, event: Any) -> None:
+    def _take(self, client: Any, event: Any) -> None:
         """Take where somebody pulls at what the flange carries; a box is pushed nowhere else."""
         if event.target.name in {link.name for link in self.arm.links[:-1]}:
             if event.phase == "start":
                 refusal = "pull at the last link or at the tool: a box is pushed there"
-                self._errands.tell(event.client, "Not done", refusal)
+                self._errands.tell(client, "Not done", refusal)
             return
         self._change("pull end" if event.phase == "end" else "pull")
         flange, base = self.arm.T_base_flange, self._drawing.root.position
@@ -213,8 +211,8 @@ class Guiding:
         return np.array(numbers(self._robot.values, name))
 
 
-def _read_drag(event: Any) -> tuple[Any, str, Array]:
-    """Who drags a frame, the phase, and where the frame is (4, 4) below the base."""
+def _read_drag(event: Any) -> tuple[str, Array]:
+    """Phase of a drag, and where the frame is (4, 4) below the base."""
     frame = event.target
     pose = pin.XYZQUATToSE3(np.append(frame.position, np.roll(frame.wxyz, -1)))
-    return event.client, event.phase, pose.homogeneous
+    return event.phase, pose.homogeneous

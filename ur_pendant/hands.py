@@ -8,11 +8,14 @@ simulated takes nothing.
 
 from __future__ import annotations
 
-import threading
+import time
 from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack
+from functools import partial
 from importlib import resources
-from typing import Any, NamedTuple
+from threading import Lock, Thread
+from typing import Any
 
 import numpy as np
 
@@ -25,33 +28,15 @@ from protocol.ur_types import ProgramState, RobotMode, SoftwareVersion
 from ur_emulator.errors import EmulatorError
 from ur_emulator.host.control_api.http_client import ControlClient
 from ur_emulator.host.control_api.operations import make
-from ur_pendant.robot import Robot, numbers
+from ur_pendant.robot import Robot, numbers, plain
+from ur_pendant.server import Events
+
+Errand = Callable[[], object]
 
 
 class HandError(Exception):
     """What was asked for was not done; one line for people."""
 
-
-class Key(NamedTuple):
-    """A key of a pendant: the line for the dashboard server, and the operation that does the same."""
-
-    label: str
-    line: str
-    operation: str
-
-
-KEYS = (
-    Key("Power on", "power on", "power_on"),
-    Key("Release brakes", "brake release", "release_brakes"),
-    Key("Power off", "power off", "power_off"),
-    Key("Play", "play", "resume_program"),
-    Key("Pause", "pause", "pause_program"),
-    Key("Stop", "stop", "stop_program"),
-    Key("Unlock protective stop", "unlock protective stop", "unlock_protective_stop"),
-    Key("Restart safety", "restart safety", "restart_safety"),
-    Key("Close popup", "close popup", "close_popups"),
-)
-"""Of a real pendant; replies of the dashboard are shown as they come."""
 
 _REFUSALS = ("could not", "cannot", "failed", "not allowed", "unable", "no such", "error", "not found")
 """What a reply of the dashboard has when the command was not carried out."""
@@ -59,21 +44,12 @@ _REFUSALS = ("could not", "cannot", "failed", "not allowed", "unable", "no such"
 SPEED, ACCELERATION = 0.6, 1.5
 """Of a joint that follows [rad/s, rad/s²]: a third of what a UR3 may, so that TCP limits hold, too."""
 
-_SILENCE = 0.3
-"""The arm stops when no target comes for so long [s]."""
-
-_THERE = 1e-3
-"""A joint whose target is so near its goal has reached it [rad]."""
-
-_REST = 3.0
-"""A program that nobody moves ends so long after the arm has reached its goal [s]: others may want it."""
-
-_START = 2.0
-"""A program that has not begun after so long [s] does not run: in local control, for example."""
-
-_MOVE = "pendant_move"
-"""The program that moves a box in lockstep."""
-
+_SILENCE = 0.3  # The arm stops when no target comes for so long [s].
+_THERE = 1e-3  # A joint whose target is so near its goal has reached it [rad].
+_REST = 3.0  # So long after the arm has reached its goal the program ends [s]: others may want the arm.
+_START = 2.0  # A program that has not begun after so long [s] does not run: in local control, for example.
+_MOVE = "pendant_move"  # The program that moves a box in lockstep.
+_AGAIN = 2.0  # Before the same is told again [s]: a button that is held may have the same answer often.
 _RATE = 30.0
 _UPPER_SINCE = (SoftwareVersion(3, 9), SoftwareVersion(5, 3))
 """First software with registers from 24 on, which fieldbuses leave alone."""
@@ -89,12 +65,15 @@ class Hands:
 
     # --- keys of a pendant
 
-    def press(self, key: Key) -> str:
-        """Press a key; return what the robot says. HandError if it was not done."""
+    def press(self, line: str, operation: str) -> str:
+        """Send the line of a key to the dashboard server, or have the operation done where there is none.
+
+        Returns what the robot says. HandError if it was not done.
+        """
         if not self._robot.address.ports.dashboard:
-            self.operate(key.operation)
+            self.operate(operation)
             return ""
-        return self.tell_dashboard(key.line)
+        return self.tell_dashboard(line)
 
     def tell_dashboard(self, line: str) -> str:
         """Have a command of the dashboard server done; return its reply. HandError if it was refused."""
@@ -123,11 +102,6 @@ class Hands:
             raise HandError(str(error)) from None
 
     # --- an emulated box
-
-    @property
-    def has_control_api(self) -> bool:
-        """Whether `operate` works."""
-        return bool(self._robot.address.control_port)
 
     def operate(self, operation: str, **arguments: Any) -> dict[str, Any]:
         """Have an operation of the control API done. HandError if it was not, with what the box says."""
@@ -185,6 +159,60 @@ class Hands:
             )
 
 
+class Errands:
+    """What people have a robot do, in other threads than that of the window, which waits for no robot.
+
+    All but `begin` is called by the window's thread; the end of an errand is an event for it, like others.
+    """
+
+    def __init__(self, events: Events) -> None:
+        self._events = events
+        self._others, self._lane = ThreadPoolExecutor(), ThreadPoolExecutor(1)
+        self._waiting: dict[str, Errand] = {}
+        self._running: Future[object] | None = None
+        self._told: tuple[Any, str] = (None, "")
+        self._told_at = 0.0
+
+    def begin(self, client: Any, errand: Errand) -> None:
+        """Begin an errand in a thread of its own, whatever the window or other errands wait for."""
+        Thread(target=self._run, args=(client, errand), daemon=True).start()
+
+    def ask(self, client: Any, errand: Errand, kind: str = "") -> None:
+        """Have an errand done; `client` is told what the robot says to it.
+
+        Errands with a kind follow each other, and one that waits gives way to a newer one of its kind: the
+        last is never lost, nor late. Others wait for none of them.
+        """
+        if kind:
+            self._waiting[kind] = partial(self._run, client, errand)
+            self._next()
+        else:
+            self._others.submit(self._run, client, errand)
+
+    def tell(self, client: Any, title: str, text: str) -> None:
+        """Tell somebody once."""
+        now, before, self._told = time.monotonic(), self._told, (client, text)
+        if client is not None and (before != self._told or now - self._told_at > _AGAIN):
+            client.add_notification(title, plain(text), auto_close_seconds=6.0)
+        self._told_at = now
+
+    def _next(self) -> None:
+        """Begin the errand with a kind that waits longest, if none runs."""
+        if self._waiting and (self._running is None or self._running.done()):
+            self._running = self._lane.submit(self._waiting.pop(next(iter(self._waiting))))
+            self._running.add_done_callback(lambda _: self._events.put(self._next))
+
+    def _run(self, client: Any, errand: Errand) -> None:
+        """Do an errand, in a thread of its own."""
+        title = "Robot"
+        try:
+            said = errand()
+        except Exception as error:
+            title, said = "Not done", str(error) or repr(error)
+        if said and isinstance(said, str):
+            self._events.put(partial(self.tell, client, title, said))
+
+
 class Follower:
     """A program in the box that goes to `goal`, and the stream of its targets.
 
@@ -196,7 +224,7 @@ class Follower:
         """Begin where the arm is. HandError if no program may run now."""
         assert robot.info is not None
         self.goal = goal
-        self._lock, self._is_ending = threading.Lock(), False
+        self._lock, self._is_ending = Lock(), False
         address, version = robot.address, robot.info.version
         first = 24 if version >= _UPPER_SINCE[version.major >= 5] else 0
         inputs = [f"input_int_register_{first}", *(f"input_double_register_{first + k}" for k in range(6))]
@@ -216,7 +244,7 @@ class Follower:
                 _check_rest(robot.values)  # as another window, which writes to the inputs: its program runs
                 raise HandError(str(error)) from None
             failing.pop_all()
-        self._thread = threading.Thread(target=self._feed, daemon=True)
+        self._thread = Thread(target=self._feed, daemon=True)
         self._thread.start()
 
     @property

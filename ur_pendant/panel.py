@@ -25,9 +25,8 @@ from ur_emulator.host.control_api.box_state import Question
 from ur_emulator.machine.controller.io.lines import DIGITAL_GROUPS, DigitalGroup
 from ur_emulator.machine.models.things import SIZES
 from ur_pendant.drawing import ArmDrawing, RobotDrawing
-from ur_pendant.events import Errand, Errands
-from ur_pendant.guiding import JOG_RATE, Guiding
-from ur_pendant.hands import KEYS, SPEED, HandError, Hands
+from ur_pendant.guiding import JOG_RATE, Guiding, Workspace
+from ur_pendant.hands import SPEED, Errand, Errands, HandError, Hands
 from ur_pendant.robot import PLOTTED, RATE, Robot, Sample, Signal, numbers, plain
 from ur_pendant.server import PageServer
 
@@ -88,16 +87,30 @@ LINES: Mapping[str, Show] = {
 # --- keys: those of a pendant, and operations of the control API
 
 Deed = Callable[[Hands], object]
-_do = partial(methodcaller, "operate")
-_KEYS: Mapping[str, Deed] = {key.label: methodcaller("press", key) for key in KEYS}
-_MODES, _POSITIONS = ("manual", "automatic", "none"), ("released", "pressed", "fully pressed", "none")
+_do, _press = partial(methodcaller, "operate"), partial(methodcaller, "press")
+EMERGENCY = {"Emergency stop": _do("emergency_stop"), "Release": _do("release_emergency_stop")}
+"""Buttons of the row that stands above all else, whatever is shown."""
+_POWER = {
+    "Power on": _press("power on", "power_on"),
+    "Release brakes": _press("brake release", "release_brakes"),
+    "Power off": _press("power off", "power_off"),
+}
+_PROGRAM = {
+    "Play": _press("play", "resume_program"),
+    "Pause": _press("pause", "pause_program"),
+    "Stop": _press("stop", "stop_program"),
+    "Close popup": _press("close popup", "close_popups"),
+}
+_SAFETY = {
+    "Unlock protective stop": _press("unlock protective stop", "unlock_protective_stop"),
+    "Restart safety": _press("restart safety", "restart_safety"),
+}
 _TROUBLE = {"Protective stop": "protective_stop", "Violation": "trigger_violation", "Fault": "trigger_fault"}
-EMERGENCY = "Emergency", {"Emergency stop": _do("emergency_stop"), "Release": _do("release_emergency_stop")}
-"""Label and buttons of the row that stands above all else, whatever is shown."""
+_MODES, _POSITIONS = ("manual", "automatic", "none"), ("released", "pressed", "fully pressed", "none")
 ROWS: Sequence[tuple[str, int, Mapping[str, Deed]]] = (
-    ("Power", 0, {label: _KEYS[label] for label in ("Power on", "Release brakes", "Power off")}),
-    ("Program", 0, {label: _KEYS[label] for label in ("Play", "Pause", "Stop", "Close popup")}),
-    ("Safety", 0, {label: _KEYS[label] for label in ("Unlock protective stop", "Restart safety")}),
+    ("Power", 0, _POWER),
+    ("Program", 0, _PROGRAM),
+    ("Safety", 0, _SAFETY),
     ("Safeguard", 3, {"Open": _do("safeguard_stop"), "Close": _do("safeguard_stop", active=False)}),
     ("Trouble", 3, {label: _do(operation) for label, operation in _TROUBLE.items()}),
     ("Mode", 5, {mode.capitalize(): _do("set_operational_mode", mode=mode) for mode in _MODES}),
@@ -107,7 +120,7 @@ ROWS: Sequence[tuple[str, int, Mapping[str, Deed]]] = (
 """Label, first major version of the software that has it (0: also without a control API), and buttons."""
 
 _FREEDRIVE = "def pendant_freedrive():\n  freedrive_mode()\n  while True:\n    sync()\n  end\nend\n"
-FREEDRIVE: Mapping[str, Deed] = {"On": methodcaller("run", _FREEDRIVE), "Off": _KEYS["Stop"]}
+FREEDRIVE: Mapping[str, Deed] = {"On": methodcaller("run", _FREEDRIVE), "Off": _PROGRAM["Stop"]}
 
 # --- text and plots
 
@@ -142,54 +155,35 @@ def _speed(robot: Robot, slider: Any) -> int:
 
 
 class Access(IntEnum):
-    """What people may do to a robot, the least first."""
+    """What people may do to a robot: nothing, what a pendant can, what the control API of a box can, too."""
 
-    NONE = 0
-    PENDANT = 1
-    """What a pendant can."""
-    BOX = 2
-    """What the control API of an emulated box can, too."""
+    NONE, PENDANT, BOX = range(3)
 
 
 class Panel:
-    """Values and controls of one robot."""
+    """Values and controls of one robot, which are made anew for another access or arm."""
 
     def __init__(
-        self,
-        server: PageServer,
-        robot: Robot,
-        hands: Hands,
-        drawing: RobotDrawing,
-        container: Any = None,
+        self, server: PageServer, robot: Robot, hands: Hands, drawing: RobotDrawing, container: Any = None
     ) -> None:
         """Make it in a `container` of viser, such as a tab, or beside the picture."""
-        self._robot, self._hands, self._drawing = robot, hands, drawing
-        self._make = partial(
-            Controls,
-            server,
-            robot,
-            hands,
-            drawing,
-            container or nullcontext(),
-            Errands(server.events),
-            {"upright": np.array((0.0, -pi / 2, 0.0, -pi / 2, 0.0, 0.0))},
-        )
+        workspace = Workspace(server, robot, hands, drawing, Errands(server.events))
+        postures = {"upright": np.array((0.0, -pi / 2, 0.0, -pi / 2, 0.0, 0.0))}
+        self._make = partial(Controls, workspace, container or nullcontext(), postures)
+        self._robot, self._drawing = robot, drawing
         self._controls: Controls | None = None
 
     def update(self) -> None:
         """Show what is new; call it 30 times a second, after the drawing's."""
-        access = Access.PENDANT + self._hands.has_control_api if self._robot.is_held else Access.NONE
+        access = (
+            Access.PENDANT + bool(self._robot.address.control_port) if self._robot.is_held else Access.NONE
+        )
         wanted = Access(access), self._drawing.arm
         if self._controls is None or self._controls.made_for != wanted:
-            self.remove()
+            if self._controls is not None:
+                self._controls.remove()
             self._controls = self._make(*wanted)
         self._controls.update()
-
-    def remove(self) -> None:
-        """Take everything away."""
-        if self._controls is not None:
-            self._controls.remove()
-        self._controls = None
 
 
 class Controls:
@@ -197,29 +191,24 @@ class Controls:
 
     def __init__(
         self,
-        server: PageServer,
-        robot: Robot,
-        hands: Hands,
-        drawing: RobotDrawing,
+        workspace: Workspace,
         container: Any,
-        errands: Errands,
         postures: dict[str, Array],
         access: Access,
         arm: ArmDrawing | None,
     ) -> None:
         self.made_for = access, arm
-        self._server, self._gui, self._robot, self._hands = server, server.gui, robot, hands
-        self._errands, self._container, self._postures, self._access = errands, container, postures, access
+        self._server, self._robot, self._hands, drawing, self._errands = workspace
+        self._container, self._postures, self._access = container, postures, access
+        self._gui, self._entry = self._server.gui, self._server.events.entry
         self._base = drawing.root.name
         self._refreshed = 0.0
         self._following: list[tuple[Any, str, Callable[[Robot], object]]] = []
         self._asked: dict[Question | str, Any] = {}
         self._charts: deque[tuple[Any, Any]] = deque()
-        self._guiding: Guiding | None = None
-        if access > Access.NONE and arm is not None:
-            self._guiding = Guiding(server, robot, hands, errands, drawing, arm)
+        self._guiding = Guiding(workspace, arm) if access > Access.NONE and arm is not None else None
         with container:
-            self._parts = [self._emergency_row(*EMERGENCY)] if access is Access.BOX else []
+            self._parts = [self._emergency_row()] if access is Access.BOX else []
             self._tabs = self._gui.add_tab_group()
         self._parts.append(self._tabs)
         for label, least, make in (
@@ -278,9 +267,10 @@ class Controls:
         if is_box:
             slider = gui.add_slider("Speed %", 0, 100, 1, 100)
             set_speed, ask = partial(hands.operate, "set_speed"), self._errands.ask
-            self._on(
-                slider.on_update,
-                lambda client: ask(client, partial(set_speed, fraction=slider.value / 100), "speed"),
+            slider.on_update(
+                self._entry(
+                    lambda client: ask(client, partial(set_speed, fraction=slider.value / 100), "speed")
+                )
             )
             self._following.append((slider, "value", lambda robot: _speed(robot, slider)))
         if robot.address.ports.dashboard:
@@ -299,8 +289,8 @@ class Controls:
                 for sign, symbol in ((-1, "−"), (1, "+")):
                     button = self._gui.add_button(f"{name} {symbol}")
                     step = partial(guiding.jog, joint=joint, step=sign * SPEED / JOG_RATE)
-                    self._on(partial(button.on_hold, callback_hz=JOG_RATE), step)
-                    self._on(button.on_click, guiding.release)
+                    button.on_hold(self._entry(step), JOG_RATE)
+                    button.on_click(self._entry(guiding.release))
         self._texts(ARM)
 
     def _make_postures(self, guiding: Guiding) -> None:
@@ -313,9 +303,9 @@ class Controls:
         self._row("Freedrive", FREEDRIVE)
         stored = gui.add_dropdown("Posture", tuple(postures))
         self._following.append((stored, "options", lambda _: tuple(postures)))
-        self._on(gui.add_button("Store posture").on_click, store)
-        go = gui.add_button("Go there").on_click
-        self._on(go, lambda client: guiding.go(client, postures[stored.value]))
+        gui.add_button("Store posture").on_click(self._entry(store))
+        go = self._entry(lambda client: guiding.go(client, postures[stored.value]))
+        gui.add_button("Go there").on_click(go)
 
     def _make_lines(self) -> None:
         is_box = self._access is Access.BOX
@@ -346,9 +336,9 @@ class Controls:
             f"{self._base}/place", 0.2, disable_rotations=True, position=at.value, visible=False
         )
         self._parts.append(place)
-        self._on(is_shown.on_update, lambda _: setattr(place, "visible", is_shown.value))
-        self._on(place.on_update, lambda _: setattr(at, "value", tuple(np.round(place.position, 3))))
-        self._on(at.on_update, lambda _: setattr(place, "position", at.value))
+        is_shown.on_update(self._entry(lambda _: setattr(place, "visible", is_shown.value)))
+        place.on_update(self._entry(lambda _: setattr(at, "value", tuple(np.round(place.position, 3)))))
+        at.on_update(self._entry(lambda _: setattr(place, "position", at.value)))
 
         def put(operation: str, **more: float) -> Errand:
             given = {"name": name.value, "shape": shape.value, "pose": (*at.value, 0.0, 0.0, 0.0)}
@@ -396,23 +386,9 @@ class Controls:
         text = self._gui.add_text(label, "", disabled=True, multiline=True)
         self._following.append((text, "value", lambda robot: _listed(items(robot))))
 
-    def _on(
-        self,
-        register: Callable[[Any], object],
-        handle: Callable[..., object],
-        read: Callable[[Any], tuple[Any, ...]] = lambda event: (event.client,),
-    ) -> None:
-        """Have `handle` called when somebody uses a control; what the panel changes itself has no client."""
-
-        def take(client: Any, *more: Any) -> None:
-            if client is not None:
-                handle(client, *more)
-
-        register(self._server.events.entry(take, read))
-
     def _button(self, label: str, decide: Callable[[], Errand]) -> None:
         ask = self._errands.ask
-        self._on(self._gui.add_button(label).on_click, lambda client: ask(client, decide()))
+        self._gui.add_button(label).on_click(self._entry(lambda client: ask(client, decide())))
 
     def _row(self, label: str, deeds: Mapping[str, Deed]) -> Any:
         """Buttons beside each other."""
@@ -421,16 +397,16 @@ class Controls:
             self._errands.ask(client, partial(deeds[button], self._hands))
 
         row = self._gui.add_button_group(label, tuple(deeds))
-        self._on(row.on_click, press, lambda event: (event.client, event.target.value))
+        row.on_click(self._entry(press, lambda event: (event.target.value,)))
         return row
 
-    def _emergency_row(self, label: str, deeds: Mapping[str, Deed]) -> Any:
+    def _emergency_row(self) -> Any:
         """Buttons that wait neither for the window's thread nor for what has been asked for before."""
 
         async def press(event: Any) -> None:
-            self._errands.begin(event.client, partial(deeds[event.target.value], self._hands))
+            self._errands.begin(event.client, partial(EMERGENCY[event.target.value], self._hands))
 
-        row = self._gui.add_button_group(label, tuple(deeds))
+        row = self._gui.add_button_group("Emergency", tuple(EMERGENCY))
         row.on_click(press)
         return row
 
@@ -465,7 +441,7 @@ class Controls:
                 kind, answer = new.kind.capitalize(), partial(self._answer, new)
                 given = gui.add_dropdown(kind, ("yes", "no")) if kind == "Boolean" else gui.add_text(kind, "")
                 self._button("Answer", lambda: partial(answer, given.value))
-            self._row("Program", {label: _KEYS[label] for label in ("Close popup", "Stop")})
+            self._row("Program", {label: _PROGRAM[label] for label in ("Close popup", "Stop")})
         for client in self._server.get_clients().values():
             client.add_notification("A program says", text, auto_close_seconds=6.0)
         return folder

@@ -12,9 +12,13 @@ import asyncio
 import http
 import re
 import socket
+import time
+from collections.abc import Callable, Coroutine, Iterator
 from contextlib import redirect_stdout, suppress
+from functools import partial
 from hashlib import sha256
 from http.cookies import SimpleCookie
+from queue import Empty, SimpleQueue
 from secrets import compare_digest, token_hex
 from threading import Thread
 from typing import Any
@@ -29,7 +33,6 @@ from websockets.server import ServerProtocol
 
 from ur_emulator.errors import EmulatorError
 from ur_emulator.host.box_options import check_token, is_loopback
-from ur_pendant.events import Events
 
 MOST_PAGES = 20
 """Pages that may be open at once."""
@@ -49,6 +52,42 @@ _HOST = re.compile(r"(\[[0-9A-Fa-f:.]+\]|[A-Za-z0-9.-]+)(?::[0-9]{1,5})?")
 
 class WindowError(Exception):
     """The window cannot be opened; one line for people."""
+
+
+class Events:
+    """What happens at the pages of a window, in one queue.
+
+    Callbacks of viser only put; the thread of the window takes, and alone changes what the window knows.
+    """
+
+    def __init__(self) -> None:
+        self._queue: SimpleQueue[Callable[[], object]] = SimpleQueue()
+
+    def put(self, handle: Callable[[], object]) -> None:
+        """Have something done by the window's thread."""
+        self._queue.put(handle)
+
+    def entry(
+        self, handle: Callable[..., object], read: Callable[[Any], tuple[Any, ...]] = lambda event: ()
+    ) -> Callable[[Any], Coroutine[Any, Any, None]]:
+        """Return a callback: `handle` gets the client, and what `read` finds when the event happens.
+
+        viser awaits such a callback before the next event, and would call plain functions in any order. What
+        the window changes itself has no client, and is no event.
+        """
+
+        async def enter(event: Any) -> None:
+            client = getattr(event, "client", event)  # a client that connects is the event
+            if client is not None:
+                self.put(partial(handle, client, *read(event)))
+
+        return enter
+
+    def until(self, end: float) -> Iterator[Callable[[], object]]:
+        """Yield what is to be done, as it comes, until a time of `time.monotonic`."""
+        while (left := end - time.monotonic()) > 0.0:
+            with suppress(Empty):
+                yield self._queue.get(timeout=left)
 
 
 class PageServer(viser.ViserServer):  # type: ignore[misc]  # viser has no types that mypy can use

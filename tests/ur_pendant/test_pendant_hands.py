@@ -9,7 +9,7 @@ import pytest
 from protocol.ur_types import Ports
 from ur_emulator import ControlBox
 from ur_pendant import hands as hands_module
-from ur_pendant.hands import KEYS, HandError, Hands
+from ur_pendant.hands import HandError, Hands
 from ur_pendant.robot import Address, Robot
 
 LIMIT = 20.0  # s, for hangs
@@ -76,12 +76,11 @@ def test_a_robot_that_does_not_answer_has_a_problem_and_is_not_held():
 
 def test_keys_are_lines_of_the_dashboard(box, robot):
     hands = Hands(robot)
-    key = {key.label: key for key in KEYS}
-    assert hands.press(key["Power off"]) == "Powering off"
+    assert hands.press("power off", "power_off") == "Powering off"
     box.wait_until(robot_mode="POWER_OFF")
     with pytest.raises(HandError, match=r"(?i)fail|cannot|could not"):
-        hands.press(key["Play"])
-    hands.press(key["Release brakes"])
+        hands.press("play", "resume_program")
+    hands.press("brake release", "release_brakes")
     box.wait_until(robot_mode="RUNNING")
 
 
@@ -89,7 +88,7 @@ def test_where_there_is_no_dashboard_keys_are_operations(box, robot):
     robot.address = replace(robot.address, ports=replace(robot.address.ports, dashboard=0))
     hands = Hands(robot)
     for operation, mode in (("power_off", "POWER_OFF"), ("release_brakes", "RUNNING")):
-        hands.press(next(key for key in KEYS if key.operation == operation))
+        hands.press("no line", operation)
         box.wait_until(robot_mode=mode)
 
 
@@ -127,7 +126,7 @@ def test_a_robot_that_is_not_simulated_takes_nothing(robot, why):
         robot.info = replace(robot.info, simulated=False if why == "real arm" else None)
     hands = Hands(robot)
     for do in (
-        lambda: hands.press(KEYS[0]),
+        lambda: hands.press("play", "resume_program"),
         lambda: hands.tell_dashboard("play"),
         lambda: hands.run("movej([0,0,0,0,0,0])"),
         lambda: hands.operate("power_off"),

@@ -41,8 +41,8 @@ MODEL = robot_model("ur5e")
 class Hands:
     """Records what is done; refuses when it has a `refusal`."""
 
-    def __init__(self, *, has_control_api=True):
-        self.has_control_api, self.done, self.goal, self.refusal = has_control_api, [], None, ""
+    def __init__(self):
+        self.done, self.goal, self.refusal = [], None, ""
 
     def _do(self, *what):
         if self.refusal:
@@ -50,9 +50,10 @@ class Hands:
         self.done.append(what)
         return "reply" if what[0] == "tell_dashboard" else {}
 
-    def press(self, key):
-        self._do("press", key.label)
-        return f"{key.label} done"
+    def press(self, line, operation):
+        make(operation, {})
+        self._do("press", line)
+        return f"{line} done"
 
     def operate(self, operation, **arguments):
         try:
@@ -93,7 +94,7 @@ def a_robot(**changes):
     robot = SimpleNamespace(
         is_held=True, view_only=False, problem="", title="UR5e 5.15.0 at 127.0.0.1", values=values,
         info=SimpleNamespace(version=SoftwareVersion(5, 15), model="UR5e", lockstep=False), kinematics=None, state=None,
-        address=Address("127.0.0.1", Ports()), log=deque(), history=deque(), popups=(), questions=(), program="",
+        address=Address("127.0.0.1", Ports(), 29900), log=deque(), history=deque(), popups=(), questions=(), program="",
         label="", variables={},
     )  # fmt: skip
     vars(robot).update(changes)
@@ -198,11 +199,11 @@ class Window:
 
     @property
     def lane(self):
-        return self.panel._make.args[5]._lane
+        return self.panel._make.args[0].errands._lane
 
     @property
     def others(self):
-        return self.panel._make.args[5]._others
+        return self.panel._make.args[0].errands._others
 
 
 @pytest.fixture(scope="module")
@@ -214,7 +215,7 @@ def page():
 
 @pytest.fixture
 def server(page, monkeypatch):
-    monkeypatch.setattr("ur_pendant.events.ThreadPoolExecutor", Threads)
+    monkeypatch.setattr("ur_pendant.hands.ThreadPoolExecutor", Threads)
     yield page
     page.gui.reset()
     page.scene.reset()
@@ -248,15 +249,15 @@ def test_a_robot_that_is_not_held_has_values_and_no_controls_until_it_is(server)
     window.update()
     assert "Power" not in window.labels()
     assert not window.drawing.arm.links[-1]._has_any_drag_callbacks()
-    window.panel.remove()
+    window.panel._controls.remove()
     assert not window.labels()
 
 
 @pytest.mark.parametrize(("major", "has_api"), [(3, True), (5, True), (10, True), (5, False)])
 def test_every_key_does_what_it_says_where_the_robot_has_it(server, major, has_api):
     info = SimpleNamespace(version=SoftwareVersion(major, 15), model="UR5e", lockstep=False)
-    hands = Hands(has_control_api=has_api)
-    window = Window(server, a_robot(info=info), hands)
+    hands = Hands()
+    window = Window(server, a_robot(info=info, address=Address("127.0.0.1", Ports(), 29900 * has_api)), hands)
     for label, since, deeds in ROWS:
         assert (
             (label in window.labels() - {"Control"})
@@ -280,7 +281,7 @@ def test_what_is_not_done_is_told_once_and_replies_are_told(window):
     window.hands.refusal = "no power: it is <b>late</b>\n"
     for _ in range(5):
         window.hold("base +")
-    assert window.client.told == [("Robot", "Power on done"), ("Not done", "no power: it is <b>late</b> ")]
+    assert window.client.told == [("Robot", "power on done"), ("Not done", "no power: it is <b>late</b> ")]
 
 
 def test_programs_speed_inputs_and_freedrive(window):
@@ -300,7 +301,7 @@ def test_programs_speed_inputs_and_freedrive(window):
     ]
     assert run[0] == "run"
     assert "freedrive_mode()" in run[1]
-    assert stop == ("press", "Stop")
+    assert stop == ("press", "stop")
 
 
 def test_controls_follow_the_robot_and_nobody_is_asked(window):
@@ -410,7 +411,7 @@ def test_popups_and_questions_until_they_are_gone(window):
     container = window.server.gui._container_handle_from_uuid[text._impl.parent_container_id]
     assert emergency.order < container.order < window.panel._controls._tabs.order
     window.choose(window.controls()[-1], "Close popup")
-    assert window.hands.done.pop() == ("press", "Close popup")
+    assert window.hands.done.pop() == ("press", "close popup")
     robot.popups = ()
     window.update()
     assert "Text" not in window.labels()

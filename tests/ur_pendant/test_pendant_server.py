@@ -6,6 +6,7 @@ from queue import SimpleQueue
 from time import monotonic
 
 import msgspec
+import numpy as np
 import pytest
 import viser
 from viser._messages import ShareUrlDisconnect, ShareUrlRequest
@@ -21,6 +22,12 @@ UPGRADE = {
     "Sec-WebSocket-Key": "dGhlIHNhbXBsZSBub25jZQ==",
     "Sec-WebSocket-Protocol": "viser-v1.1.1",
 }
+
+X, Y, Z = np.eye(3).tolist()
+CAMERA = {
+    "wxyz": [1.0, 0.0, 0.0, 0.0], "position": X, "look_at": Y, "up_direction": Z, "fov": 1.0, "near": 0.1, "far": 9.0,
+    "image_width": 390, "image_height": 844,
+}  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -134,19 +141,30 @@ def test_so_many_pages_may_be_open_at_once(server, monkeypatch):
 def test_events_of_a_page_come_in_their_order_and_the_end_of_a_drag_with_its_pose(server):
     frame = server.scene.add_transform_controls("/frame")
     taken = SimpleQueue()
-    frame.on_update(server.events.entry(taken.put, lambda event: ((event.phase, event.target.position[0]),)))
+    enter = server.events.entry(
+        lambda _, *what: taken.put(what), lambda event: (event.phase, frame.position[0])
+    )
+    frame.on_update(enter)
 
     def send(kind, **more):
-        one.send(msgspec.msgpack.encode({"type": kind, "name": "/frame", "owner": "", **more}))
+        one.send(msgspec.msgpack.encode({"type": kind, **more}))
 
     with page(server.address) as one:
-        send("TransformControlsDragStartMessage")
+        send("ViewerCameraMessage", **CAMERA)
+        send("TransformControlsDragStartMessage", name="/frame")
         for x in range(100):
-            send("TransformControlsUpdateMessage", wxyz=(1.0, 0.0, 0.0, 0.0), position=(float(x), 0.0, 0.0))
-        send("TransformControlsDragEndMessage")
+            send(
+                "TransformControlsUpdateMessage",
+                name="/frame",
+                wxyz=(1.0, 0.0, 0.0, 0.0),
+                position=(float(x), 0.0, 0.0),
+            )
+        send("TransformControlsDragEndMessage", name="/frame")
         for handle in server.events.until(monotonic() + 20.0):
             handle()
             if taken.qsize() == 102:
                 break
+            client = next(iter(server.get_clients().values()), None)
+        assert client.camera.look_at.tolist() == [0.2, 0.0, -0.5]  # it is a phone
     got = [taken.get() for _ in range(taken.qsize())]
     assert got == [("start", 0.0), *(("update", float(x)) for x in range(100)), ("end", 99.0)]
