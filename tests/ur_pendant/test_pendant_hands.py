@@ -49,14 +49,14 @@ def test_a_robot_is_read_by_rtde_the_primary_port_and_the_control_api(box, robot
     assert (robot.questions[0].text, robot.program) == ("how many?", "asks")
     box.stop_program()
     until(lambda: not robot.questions and robot.program == "", "the end of the question")
-    until(lambda: any("asks" in line.text for line in robot.log), "its line in the log")
+    until(lambda: any("asks" in text for _, text in robot.log), "its line in the log")
     box.run_program("def counts():\n  global n = 7\n  sync()\nend\n")
     until(lambda: {name: str(value) for name, value in robot.variables.items()} == {"n": "7"}, "the variable")
     assert [client.partition(" at ")[2].split()[0] for client in robot.state.clients] == ["rtde", "primary"]
 
 
 def test_without_the_control_api_the_primary_port_tells_of_programs_popups_and_questions(box):
-    robot = Robot(replace(address_of(box), control_port=0))
+    robot = Robot(address_of(box)._replace(control_port=0))
     until(lambda: robot.values, "the robot")
     box.run_program('def says():\n  popup("look")\n  request_string_from_primary_client("who?")\nend\n')
     until(lambda: robot.popups and robot.questions, "popup and question")
@@ -85,7 +85,7 @@ def test_keys_are_lines_of_the_dashboard(box, robot):
 
 
 def test_where_there_is_no_dashboard_keys_are_operations(box, robot):
-    robot.address = replace(robot.address, ports=replace(robot.address.ports, dashboard=0))
+    robot.address = robot.address._replace(ports=replace(robot.address.ports, dashboard=0))
     hands = Hands(robot)
     for operation, mode in (("power_off", "POWER_OFF"), ("release_brakes", "RUNNING")):
         hands.press("no line", operation)

@@ -28,7 +28,7 @@ from ur_pendant.drawing import RobotDrawing
 from ur_pendant.guiding import AHEAD, JUMP, STIFFNESS, jogged, pulled, reached
 from ur_pendant.hands import HandError
 from ur_pendant.panel import FREEDRIVE, LINES, ROWS, Panel, columns
-from ur_pendant.robot import PLOTTED, Address, LogLine, Robot, Sample, plain
+from ur_pendant.robot import PLOTTED, Address, Robot, Sample, plain
 from ur_pendant.server import open_server
 
 Q = (0.3, -1.7, -2.0, -0.2, 1.4, 1.8)
@@ -369,7 +369,7 @@ def test_text_is_one_line_of_what_prints(text):
 def test_hostile_texts_are_shown_as_text(window):
     robot, question = window.robot, Question(3, "STRING", HOSTILE)
     robot.state, robot.variables = a_state(program=HOSTILE, clients=(HOSTILE,)), {HOSTILE: HOSTILE}
-    robot.log.extend(LogLine(k, f"{k} {HOSTILE}") for k in range(100))
+    robot.log.extend((k, f"{k} {HOSTILE}") for k in range(100))
     vars(robot).update(
         problem=HOSTILE, program=HOSTILE, label=HOSTILE, popups=(HOSTILE,) * 9, questions=(question,)
     )
