@@ -147,7 +147,7 @@ class Hands:
     def goal(self) -> Array | None:
         """Where the arm goes (6,) [rad]; None while it follows nobody."""
         follower = self._follower
-        return np.array(follower.goal) if follower is not None and follower.is_alive else None
+        return np.array(follower.goal) if follower is not None and follower.is_alive() else None
 
     def _check(self) -> None:
         """Raise HandError for a robot that is only shown."""
@@ -213,7 +213,7 @@ class Errands:
             self._events.put(partial(self.tell, client, title, said))
 
 
-class Follower:
+class Follower(Thread):
     """A program in the box that goes to `goal`, and the stream of its targets.
 
     It ends when the arm has been at an unchanged goal for `_REST`, and when its program has ended, as by a
@@ -222,6 +222,7 @@ class Follower:
 
     def __init__(self, robot: Robot, run: Callable[[str], None], goal: tuple[float, ...]) -> None:
         """Begin where the arm is. HandError if no program may run now."""
+        super().__init__(daemon=True)
         assert robot.info is not None
         self.goal = goal
         self._lock, self._is_ending = Lock(), False
@@ -244,13 +245,7 @@ class Follower:
                 _check_rest(robot.values)  # as another window, which writes to the inputs: its program runs
                 raise HandError(str(error)) from None
             failing.pop_all()
-        self._thread = Thread(target=self._feed, daemon=True)
-        self._thread.start()
-
-    @property
-    def is_alive(self) -> bool:
-        """Whether the program still follows."""
-        return self._thread.is_alive()
+        self.start()
 
     def take(self, goal: tuple[float, ...]) -> bool:
         """Go to another goal; return False if it is too late for one."""
@@ -259,11 +254,8 @@ class Follower:
                 self.goal = goal
             return not self._is_ending
 
-    def join(self) -> None:
-        """Wait for the end."""
-        self._thread.join()
-
-    def _feed(self) -> None:
+    def run(self) -> None:
+        """Send the goal until the end."""
         counter, resting, has_run = 2, 0.0, False
         last: tuple[float, ...] = ()
         try:

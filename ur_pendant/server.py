@@ -9,7 +9,6 @@ takes no websocket that did not come through the gate, and nothing is published.
 from __future__ import annotations
 
 import asyncio
-import http
 import re
 import socket
 import time
@@ -17,6 +16,7 @@ from collections.abc import Callable, Coroutine, Iterator
 from contextlib import redirect_stdout, suppress
 from functools import partial
 from hashlib import sha256
+from http import HTTPStatus
 from http.cookies import SimpleCookie
 from queue import Empty, SimpleQueue
 from secrets import compare_digest, token_hex
@@ -38,10 +38,8 @@ MOST_PAGES = 20
 """Pages that may be open at once."""
 
 _LONGEST, _PATIENCE = 1 << 14, 10.0  # of a request [bytes], and until it is there [s]
-_NO_REQUEST = (OSError, asyncio.IncompleteReadError, asyncio.LimitOverrunError, MultipleValuesError)
 _CHUNK = 1 << 16  # bytes
-_PASSED = "X-Ur-Pendant-Passed"
-"""Header with which the gate passes a request on."""
+_PASSED = "X-Ur-Pendant-Passed"  # Header with which the gate passes a request on.
 
 _LOOK_AT = (0.2, 0.0, 0.3)
 _NARROW, _BELOW = 600, 0.8  # pixels, m
@@ -98,8 +96,19 @@ class PageServer(viser.ViserServer):  # type: ignore[misc]  # viser has no types
         events: what happens at its pages.
     """
 
-    def __init__(self, listening: socket.socket, token: str | None, title: str) -> None:
-        """Serve pages that connect to the socket."""
+    def __init__(self, host: str, port: int, token: str | None, title: str) -> None:
+        """Open the port of a window.
+
+        Args:
+            host: address of this machine; one that others reach needs a token.
+            port: 0 takes a free one.
+            token: what a page must show once, as `/?token=...`.
+            title: of the page.
+
+        Raises:
+            WindowError: another address without a token, or the port is taken.
+        """
+        listening = _listening_socket(host, port, token)
         self.address: tuple[str, int] = listening.getsockname()[:2]
         self.events = Events()
         self._token, self._pages, self._secret = token, 0, token_hex()
@@ -150,27 +159,45 @@ class PageServer(viser.ViserServer):  # type: ignore[misc]  # viser has no types
 
     async def _attend(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         """Look at the request of a connection, and pass the connection on if it may go on."""
+        protocol = ServerProtocol()
         try:
-            with suppress(*_NO_REQUEST):
-                async with asyncio.timeout(_PATIENCE):
-                    head = await reader.readuntil(b"\r\n\r\n")
-                protocol = ServerProtocol()
-                protocol.receive_data(head)
-                for request in protocol.events_received():
-                    assert isinstance(request, Request)
-                    is_page = request.headers.get("Upgrade", "").lower() == "websocket"
-                    is_full = is_page and self._pages >= MOST_PAGES
-                    if refusal := _refusal(request, self._token, is_page=is_page, is_full=is_full):
-                        protocol.send_response(protocol.reject(http.HTTPStatus.FORBIDDEN, f"{refusal}\n"))
-                        writer.writelines(protocol.data_to_send())
-                        continue
-                    self._pages += is_page
-                    try:
-                        await self._pass(head, reader, writer)
-                    finally:
-                        self._pages -= is_page
+            async with asyncio.timeout(_PATIENCE):
+                head = await reader.readuntil(b"\r\n\r\n")
+            protocol.receive_data(head)
+            for request in protocol.events_received():  # none, or one
+                assert isinstance(request, Request)
+                is_page = request.headers.get("Upgrade", "").lower() == "websocket"
+                refusal = self._refusal(request, is_page=is_page)
+                if refusal:
+                    protocol.send_response(protocol.reject(HTTPStatus.FORBIDDEN, f"{refusal}\n"))
+                    writer.writelines(protocol.data_to_send())
+                    return
+                self._pages += is_page
+                try:
+                    await self._pass(head, reader, writer)
+                finally:
+                    self._pages -= is_page
+        except (OSError, asyncio.IncompleteReadError, asyncio.LimitOverrunError, MultipleValuesError):
+            pass  # it is no request, or the page is gone
         finally:
             writer.close()
+
+    def _refusal(self, request: Request, *, is_page: bool) -> str:
+        """Return why a request is refused; "" if it may go on."""
+        headers, token = request.headers, self._token
+        host, origin = headers.get("Host", ""), headers.get("Origin")
+        named = _HOST.fullmatch(host)
+        if named is None or (token is None and not is_loopback(named[1].strip("[]"))):
+            return f"host {ascii(host)[:60]} given: open the page by 127.0.0.1 or localhost"
+        if origin is not None and origin != f"http://{host}":
+            return f"pages of {ascii(origin)[:60]} may not use this window"
+        if token is not None and not _shows(request, token):
+            return "this window needs its token: open it as /?token=..."
+        if is_page and self._pages >= MOST_PAGES:
+            return f"{MOST_PAGES} pages are open: close one"
+        if is_page and f"viser-v{viser.__version__}" not in headers.get("Sec-WebSocket-Protocol", ""):
+            return "the page is of another version of viser: load it again"
+        return ""
 
     async def _pass(self, head: bytes, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         inner_reader, inner_writer = await asyncio.open_connection("127.0.0.1", self.get_port())
@@ -196,17 +223,7 @@ async def _copy(source: asyncio.StreamReader, sink: asyncio.StreamWriter) -> Non
     sink.close()
 
 
-def open_server(host: str, port: int, token: str | None, title: str) -> PageServer:
-    """Open the port of a window.
-
-    Args:
-        host: address of this machine; one that others reach needs a token.
-        port: 0 takes a free one.
-        token: what a page must show once, as `/?token=...`.
-
-    Raises:
-        WindowError: another address without a token, or the port is taken.
-    """
+def _listening_socket(host: str, port: int, token: str | None) -> socket.socket:
     try:
         check_token(token)
     except EmulatorError as error:
@@ -216,34 +233,14 @@ def open_server(host: str, port: int, token: str | None, title: str) -> PageServ
             f"{host} can be reached by other machines: give it a --token, or open the window here and look "
             f"at it through a tunnel: ssh -L {port}:127.0.0.1:{port} THIS_MACHINE"
         )
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
     try:
-        listening = socket.create_server(
-            (host, port), family=socket.AF_INET6 if ":" in host else socket.AF_INET
-        )
+        return socket.create_server((host, port), family=family)
     except OSError as error:
         raise WindowError(
             f"port {port} of {host} cannot be opened ({error.strerror}): give another --port or --listen "
             "(of `ur-emulator serve`: --window-port or --window-host)"
         ) from None
-    return PageServer(listening, token, title)
-
-
-def _refusal(request: Request, token: str | None, *, is_page: bool, is_full: bool) -> str:
-    """Return why a request is refused; "" if it may go on."""
-    headers = request.headers
-    host, origin = headers.get("Host", ""), headers.get("Origin")
-    named = _HOST.fullmatch(host)
-    if named is None or (token is None and not is_loopback(named[1].strip("[]"))):
-        return f"host {ascii(host)[:60]} given: open the page by 127.0.0.1 or localhost"
-    if origin is not None and origin != f"http://{host}":
-        return f"pages of {ascii(origin)[:60]} may not use this window"
-    if token is not None and not _shows(request, token):
-        return "this window needs its token: open it as /?token=..."
-    if is_full:
-        return f"{MOST_PAGES} pages are open: close one"
-    if is_page and f"viser-v{viser.__version__}" not in headers.get("Sec-WebSocket-Protocol", ""):
-        return "the page is of another version of viser: load it again"
-    return ""
 
 
 def _shows(request: Request, token: str) -> bool:

@@ -26,7 +26,7 @@ from ur_pendant.drawing import RobotDrawing
 from ur_pendant.hands import Hands
 from ur_pendant.panel import Panel
 from ur_pendant.robot import RATE, Address, Robot
-from ur_pendant.server import PageServer, WindowError, open_server
+from ur_pendant.server import PageServer, WindowError
 
 _BESIDE = 1.3
 """From one arm to the next in a window of several [m]."""
@@ -46,7 +46,7 @@ def show_robots(
 ) -> None:
     """Show robots until the process is interrupted; options as of `ur-emulator pendant`."""
     ports, around = Ports.standard(port_base), surroundings(cell, tool)
-    server = open_server(listen, port, os.environ.get(PAGE_TOKEN_VARIABLE), "UR")
+    server = PageServer(listen, port, os.environ.get(PAGE_TOKEN_VARIABLE), "UR")
     controls = [*control_ports, *[0] * len(hosts)]
     robots: list[Robot] = []
     updates: list[Update] = []
@@ -69,7 +69,7 @@ def show_recordings(files: Sequence[str], save: str | None, port: int) -> None:
     from ur_pendant.recordings import RecordingsWindow, load_track  # with scipy, which the robots do not need
 
     tracks = [load_track(Path(file)) for file in files]
-    server = open_server("127.0.0.1", 0 if save is not None else port, None, "UR recordings")
+    server = PageServer("127.0.0.1", 0 if save is not None else port, None, "UR recordings")
     window = RecordingsWindow(server, tracks)
     if save is None:
         _serve(server, [window.update])

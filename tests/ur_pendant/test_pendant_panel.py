@@ -29,7 +29,7 @@ from ur_pendant.guiding import AHEAD, JUMP, STIFFNESS, jogged, pulled, reached
 from ur_pendant.hands import HandError
 from ur_pendant.panel import FREEDRIVE, LINES, ROWS, Panel, columns
 from ur_pendant.robot import PLOTTED, Address, Robot, Sample, plain
-from ur_pendant.server import open_server
+from ur_pendant.server import PageServer
 
 Q = (0.3, -1.7, -2.0, -0.2, 1.4, 1.8)
 ZEROS = (0.0,) * 6
@@ -208,7 +208,7 @@ class Window:
 
 @pytest.fixture(scope="module")
 def page():
-    server = open_server("127.0.0.1", 0, None, "test")
+    server = PageServer("127.0.0.1", 0, None, "test")
     yield server
     server.stop()
 

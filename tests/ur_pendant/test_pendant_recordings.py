@@ -12,7 +12,7 @@ import pc_client as ur
 from pc_client.errors import RecordingError
 from ur_emulator import ControlBox
 from ur_pendant.recordings import RecordingsWindow, load_track
-from ur_pendant.server import open_server
+from ur_pendant.server import PageServer
 
 
 @pytest.fixture(scope="module")
@@ -25,7 +25,7 @@ def run(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def server():
-    server = open_server("127.0.0.1", 0, None, "test")
+    server = PageServer("127.0.0.1", 0, None, "test")
     yield server
     server.stop()
 

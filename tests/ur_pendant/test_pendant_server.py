@@ -13,7 +13,7 @@ from viser._messages import ShareUrlDisconnect, ShareUrlRequest
 from websockets.exceptions import ConnectionClosedError
 from websockets.sync.client import connect
 
-from ur_pendant.server import WindowError, open_server
+from ur_pendant.server import PageServer, WindowError
 
 UPGRADE = {
     "Connection": "Upgrade",
@@ -32,7 +32,7 @@ CAMERA = {
 
 @pytest.fixture(scope="module")
 def server():
-    server = open_server("127.0.0.1", 0, None, "test")
+    server = PageServer("127.0.0.1", 0, None, "test")
     yield server
     server.stop()
 
@@ -76,7 +76,7 @@ def test_only_pages_of_this_machine_open_it(server, headers, upgrade, problem):
 
 
 def test_a_token_is_shown_once_and_kept_as_its_digest():
-    server = open_server("127.0.0.1", 0, 'a"to;ken', "test")
+    server = PageServer("127.0.0.1", 0, 'a"to;ken', "test")
     try:
         for path, cookie in (
             ("/", ""),
@@ -98,15 +98,15 @@ def test_a_token_is_shown_once_and_kept_as_its_digest():
 
 def test_other_addresses_need_a_token_and_a_taken_port_is_an_error(server):
     with pytest.raises(WindowError, match=r"--token.*ssh -L 29980:127.0.0.1:29980"):
-        open_server("0.0.0.0", 29980, None, "test")
+        PageServer("0.0.0.0", 29980, None, "test")
     with pytest.raises(WindowError, match="no blanks"):
-        open_server("127.0.0.1", 0, "a b", "test")
+        PageServer("127.0.0.1", 0, "a b", "test")
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
         with pytest.raises(WindowError, match=f"port {port} of 127.0.0.1 cannot be opened.*in use.*--port "):
-            open_server("127.0.0.1", port, None, "test")
+            PageServer("127.0.0.1", port, None, "test")
     with pytest.raises(WindowError, match=r"cannot be opened.*--listen.*--window-host"):
-        open_server("192.0.2.1", 0, "token", "test")
+        PageServer("192.0.2.1", 0, "token", "test")
 
 
 def test_nobody_can_publish_the_page(server):
