@@ -135,9 +135,9 @@ _SIGNALS = {signal.name: signal for signal in PLOTTED}
 def columns(samples: Sequence[Sample], signal: Signal, now: float) -> tuple[Array, ...]:
     """Times after now [s] and six numbers of a signal, each (n,); nan where there is none."""
     width, missing = len(signal.parts) or 1, (nan,) * len(signal.parts) or nan
-    numbers = np.full((len(samples), len(_COLOURS)), nan)  # always so many, as a plot has lines
-    numbers[:, :width] = np.reshape([s.values.get(signal.name, missing) for s in samples], (-1, width))
-    return (np.array([sample.time - now for sample in samples]), *numbers.T)
+    rows = np.full((len(samples), len(_COLOURS)), nan)  # always so many, as a plot has lines
+    rows[:, :width] = np.reshape([s.values.get(signal.name, missing) for s in samples], (-1, width))
+    return (np.array([sample.time - now for sample in samples]), *rows.T)
 
 
 def _listed(texts: Iterable[str]) -> str:

@@ -12,7 +12,6 @@ import pc_client as ur
 from pc_client.errors import RecordingError
 from ur_emulator import ControlBox
 from ur_pendant.recordings import RecordingsWindow, load_track
-from ur_pendant.server import PageServer
 
 
 @pytest.fixture(scope="module")
@@ -23,23 +22,16 @@ def run(tmp_path_factory):
         return arm.run(ur.plan(movement, arm), out=tmp_path_factory.mktemp("run"))
 
 
-@pytest.fixture(scope="module")
-def server():
-    server = PageServer("127.0.0.1", 0, None, "test")
-    yield server
-    server.stop()
-
-
 def test_two_recordings_stand_beside_each_other_at_one_moment(run, server):
     track = load_track(run.recording.path)
     assert track.error.max() < 20.0
-    assert track.speed.max() == pytest.approx(track.desired_speed.max(), rel=0.1)
+    assert track.run.tcp_speed.max() == pytest.approx(track.desired_speed.max(), rel=0.1)
     window = RecordingsWindow(server, [track, track])
     window.show(0.5)
-    k = int(np.searchsorted(track.t, 0.5))
+    k = int(np.searchsorted(track.run.t, 0.5))
     for k_arm, (actual, desired) in enumerate(window._arms):
-        assert actual.T_base_flange[:3, 3] == pytest.approx(flange(track, track.q[k]), abs=1e-4)
-        assert desired.T_base_flange[:3, 3] == pytest.approx(flange(track, track.desired_q[k]), abs=1e-4)
+        assert actual.T_base_flange[:3, 3] == pytest.approx(flange(track, track.run.q[k]), abs=1e-4)
+        assert desired.T_base_flange[:3, 3] == pytest.approx(flange(track, track.run.ref_q[k]), abs=1e-4)
         root = server.scene.get_handle_by_name(f"/recording{k_arm}")
         assert root.position[1] == pytest.approx(-1.0 * k_arm)
 
@@ -64,7 +56,7 @@ def test_it_plays_at_a_speed_and_begins_again(run, server, monkeypatch):
     assert window._bar.value == pytest.approx(0.25)
     now[0] = 100.0
     window.update()
-    assert window._bar.value == pytest.approx(track.t[0], abs=1e-3)
+    assert window._bar.value == pytest.approx(track.run.t[0], abs=1e-3)
 
 
 def test_a_page_needs_no_server(run, tmp_path):

@@ -30,13 +30,6 @@ CAMERA = {
 }  # fmt: skip
 
 
-@pytest.fixture(scope="module")
-def server():
-    server = PageServer("127.0.0.1", 0, None, "test")
-    yield server
-    server.stop()
-
-
 def get(server, path="/", **headers):
     connection = http.client.HTTPConnection(*server.address, timeout=20)
     connection.request("GET", path, headers=headers)
