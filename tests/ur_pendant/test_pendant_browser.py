@@ -1,6 +1,7 @@
 """The window in a browser: Debian's Chromium, which draws without a graphics card, driven by selenium.
 
-What people press acts on the box and is shown; what programs say stays text; the window outlives its box.
+What people press acts on the box and is shown; what programs say stays text; the window outlives its box. The
+first test is the journey of `make test`.
 """
 
 import shutil
@@ -117,7 +118,7 @@ def opened(driver):
     driver.set_window_size(*SIZE)
 
 
-def test_keys_act_on_the_box_and_what_it_does_is_shown(box, page):
+def test_keys_act_on_the_box_and_a_joint_goes_as_long_as_its_button_is_held(box, page):
     page.tab("Robot")
     page.shows("UR5e 5.15.0")
     page.button("Power off").click()
@@ -126,9 +127,6 @@ def test_keys_act_on_the_box_and_what_it_does_is_shown(box, page):
     page.button("Release brakes").click()
     box.wait_until(robot_mode="RUNNING", timeout=LIMIT)
     page.shows("RUNNING")
-
-
-def test_a_joint_goes_as_long_as_its_button_is_held(box, page):
     page.tab("Move")
     before = box.state.q[0]
     hold = webdriver.ActionChains(page.driver)
@@ -139,10 +137,21 @@ def test_a_joint_goes_as_long_as_its_button_is_held(box, page):
     webdriver.ActionChains(page.driver).release().perform()
     q = box.wait_until(program_state="STOPPED", steady=True, timeout=LIMIT).q
     assert q[1:] == pytest.approx(box.state.target_q[1:], abs=0.01)
+    page.button("Emergency stop").click()  # it is there in every tab
+    box.wait_until(safety_mode="ROBOT_EMERGENCY_STOP", timeout=LIMIT)
+    page.button("Release").click()
+    box.wait_until(safety_mode="NORMAL", timeout=LIMIT)
+    box.release_brakes()
     page.tab("Robot")
     page.shows("none (stopped)")
+    loaded = page.driver.execute_script(
+        "return performance.getEntriesByType('resource').map(one => one.name)"
+    )
+    own = page.driver.current_url
+    assert all(name.startswith((own, "data:", "blob:")) for name in loaded)  # nothing of the network
 
 
+@pytest.mark.nightly
 def test_the_tool_is_dragged_by_the_mouse(box, page):
     """The arm follows an arrow of its frame, which turns yellow below the mouse."""
 
@@ -157,6 +166,7 @@ def test_the_tool_is_dragged_by_the_mouse(box, page):
         found = blue()
         return found[found[:, 1] > found[:, 1].max() - 8].mean(axis=0) if len(found) else np.full(2, np.nan)
 
+    page.tab("Move")
     page.until(lambda: dist(tip(), tip()) < 1.0, "the frame rests")
     x, y = np.rint(tip()).astype(int).tolist()
     before = box.state.tcp_pose
@@ -179,23 +189,10 @@ def test_the_tool_is_dragged_by_the_mouse(box, page):
     assert box.state.tcp_pose[3:] == pytest.approx(before[3:], abs=0.01)
 
 
-def test_inputs_and_obstacles(box, page):
-    page.tab("I/O")
-    page.button("3 ○").click()
-    page.until(lambda: box.state.digital_inputs["standard"][3], "the input")
-    page.button("3 ●").click()
-    page.until(lambda: not box.state.digital_inputs["standard"][3], "the input")
-    page.tab("World")
-    page.button("Put obstacle").click()
-    page.until(lambda: box.state.obstacles == ("box",), "the obstacle")
-    page.until(lambda: "nothing" not in page.texts(), "the obstacle in the list")
-    page.button("Remove").click()
-    page.until(lambda: box.state.obstacles == (), "no obstacle")
-
-
 HOSTILE = "<img src=x onerror=\\\"document.title='owned'\\\"><b>bold</b> [link](javascript:alert(1))"
 
 
+@pytest.mark.nightly
 def test_what_programs_say_is_text(box, page):
     said = HOSTILE.replace('\\"', "'")
     box.run_program(f'def says():\n  textmsg("{said}")\n  popup("{said}", "{said}")\nend\n')
@@ -209,24 +206,9 @@ def test_what_programs_say_is_text(box, page):
     page.until(lambda: "A program says" not in body.text, "no popup")
 
 
-def test_no_page_of_the_network_is_asked(page):
-    loaded = page.driver.execute_script(
-        "return performance.getEntriesByType('resource').map(one => one.name)"
-    )
-    own = page.driver.current_url
-    assert all(name.startswith((own, "data:", "blob:")) for name in loaded)
-
-
+@pytest.mark.nightly
 def test_a_question_is_answered(box, page):
     program = 'def asks():\n  textmsg("it is ", request_integer_from_primary_client("how many?"))\nend\n'
-    box.run_program(program)
-    page.shows("how many?")
-    page.tab("Move")  # the emergency stop is there in every tab, and nothing covers it
-    page.button("Emergency stop").click()
-    box.wait_until(safety_mode="ROBOT_EMERGENCY_STOP", timeout=LIMIT)
-    page.button("Release").click()
-    box.wait_until(safety_mode="NORMAL", timeout=LIMIT)
-    box.release_brakes()
     box.wait_until(robot_mode="RUNNING", timeout=LIMIT)
     box.run_program(program)
     page.shows("how many?")
@@ -237,6 +219,7 @@ def test_a_question_is_answered(box, page):
     box.wait_until(log="it is 42", timeout=LIMIT)
 
 
+@pytest.mark.nightly
 def test_a_window_outlives_its_box(opened):
     """Also the kind of arm changes; as on the screen of a phone."""
     at = {"host": "127.0.0.29", "control_port": 29900}
@@ -250,6 +233,7 @@ def test_a_window_outlives_its_box(opened):
             page.shows("UR5e 5.15")
 
 
+@pytest.mark.nightly
 def test_a_robot_that_is_only_shown_has_no_buttons(box, opened):
     with window("pendant", box.host, "--control-port", str(box.control_port), "--view") as address:
         page = opened(address)

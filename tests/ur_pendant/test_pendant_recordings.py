@@ -79,7 +79,11 @@ def test_a_run_opens_its_window(run):
     ("words", "code", "said"),
     [
         ([], 2, "window: start it by `ur-emulator pendant HOST` or `ur-client view FILE`\n"),
-        ([json.dumps({"files": ["no.mcap"], "save": None, "port": 0})], 1, "window: no.mcap is not a recording"),
+        (
+            [json.dumps({"files": ["no.mcap"], "save": None, "port": 0})],
+            1,
+            "window: no.mcap is not a recording",
+        ),
     ],
 )
 def test_what_cannot_be_shown_is_one_line(tmp_path, monkeypatch, capsys, words, code, said):
