@@ -31,6 +31,7 @@ from ur_pendant.robot import PLOTTED, RATE, Robot, Sample, Signal, numbers, plai
 from ur_pendant.server import PageServer
 
 Show = Callable[[Robot], str]
+Postures = dict[str, Array]
 
 
 def _figures(form: str, *names: str, scale: float = 1.0, part: slice = slice(None)) -> Show:
@@ -168,7 +169,7 @@ class Panel:
     ) -> None:
         """Make it in a `container` of viser, such as a tab, or beside the picture."""
         workspace = Workspace(server, robot, hands, drawing, Errands(server.events))
-        postures = {"upright": np.array((0.0, -pi / 2, 0.0, -pi / 2, 0.0, 0.0))}
+        postures: Postures = {"upright": np.array((0.0, -pi / 2, 0.0, -pi / 2, 0.0, 0.0))}
         self._make = partial(Controls, workspace, container or nullcontext(), postures)
         self._robot, self._drawing = robot, drawing
         self._controls: Controls | None = None
@@ -190,12 +191,7 @@ class Controls:
     """What a panel has for one access to a robot with one arm."""
 
     def __init__(
-        self,
-        workspace: Workspace,
-        container: Any,
-        postures: dict[str, Array],
-        access: Access,
-        arm: ArmDrawing | None,
+        self, workspace: Workspace, container: Any, postures: Postures, access: Access, arm: ArmDrawing | None
     ) -> None:
         self.made_for = access, arm
         self._server, self._robot, self._hands, drawing, self._errands = workspace

@@ -82,7 +82,9 @@ class Events:
         return enter
 
     def until(self, end: float) -> Iterator[Callable[[], object]]:
-        """Yield what is to be done, as it comes, until a time of `time.monotonic`."""
+        """Yield what is to be done: all that waits, and what comes until a time of `time.monotonic`."""
+        for _ in range(self._queue.qsize()):
+            yield self._queue.get()
         while (left := end - time.monotonic()) > 0.0:
             with suppress(Empty):
                 yield self._queue.get(timeout=left)

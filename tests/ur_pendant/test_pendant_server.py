@@ -2,6 +2,7 @@
 
 import http.client
 import socket
+from functools import partial
 from queue import SimpleQueue
 from time import monotonic
 
@@ -161,3 +162,13 @@ def test_events_of_a_page_come_in_their_order_and_the_end_of_a_drag_with_its_pos
         assert client.camera.look_at.tolist() == [0.2, 0.0, -0.5]  # it is a phone
     got = [taken.get() for _ in range(taken.qsize())]
     assert got == [("start", 0.0), *(("update", float(x)) for x in range(100)), ("end", 99.0)]
+
+
+def test_events_that_wait_are_taken_also_by_a_window_that_is_late(server):
+    taken = []
+    for k in range(3):
+        server.events.put(partial(taken.append, k))
+    for handle in server.events.until(monotonic() - 1.0):
+        handle()
+        server.events.put(handle)  # others do not wait for a page that sends without pause
+    assert taken == [0, 1, 2]
