@@ -25,7 +25,6 @@ from pc_client.driver.rtde import RtdeStream, RtdeValues
 from pc_client.driver.transport import TcpNetwork
 from pc_client.errors import ClientError
 from protocol.ur_types import ProgramState, RobotMode, SoftwareVersion
-from ur_emulator.errors import EmulatorError
 from ur_emulator.host.control_api.http_client import ControlClient
 from ur_emulator.host.control_api.operations import make
 from ur_pendant.robot import Robot, numbers, plain
@@ -56,7 +55,10 @@ _UPPER_SINCE = (SoftwareVersion(3, 9), SoftwareVersion(5, 3))
 
 
 class Hands:
-    """All that is done to one robot."""
+    """All that is done to one robot.
+
+    What was not done raises HandError, or ClientError or EmulatorError with what the robot says: one line.
+    """
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
@@ -66,10 +68,7 @@ class Hands:
     # --- keys of a pendant
 
     def press(self, line: str, operation: str) -> str:
-        """Send the line of a key to the dashboard server, or have the operation done where there is none.
-
-        Returns what the robot says. HandError if it was not done.
-        """
+        """Tell the dashboard server the line of a key, or have the operation done where there is none."""
         if not self._robot.address.ports.dashboard:
             self.operate(operation)
             return ""
@@ -79,11 +78,7 @@ class Hands:
         """Have a command of the dashboard server done; return its reply. HandError if it was refused."""
         self._check()
         address = self._robot.address
-        try:
-            answers = ask_dashboard(TcpNetwork(), address.host, address.ports.dashboard, (line,))
-        except ClientError as error:
-            raise HandError(str(error)) from None
-        reply = answers.get(line)
+        reply = ask_dashboard(TcpNetwork(), address.host, address.ports.dashboard, (line,)).get(line)
         if reply is None:
             raise HandError(f"the dashboard server does not answer to {line!r}")
         if any(word in reply.lower() for word in _REFUSALS):
@@ -91,32 +86,24 @@ class Hands:
         return reply
 
     def run(self, program: str) -> None:
-        """Send a program. HandError if it was not sent; what becomes of it the log says."""
+        """Send a program; what becomes of it the log says."""
         self._check()
         address = self._robot.address
-        try:
-            connection = TcpNetwork().connect(address.host, address.ports.secondary, 2.0)
-            connection.send(program.encode("latin-1", "replace") + b"\n")
-            connection.close()
-        except ClientError as error:
-            raise HandError(str(error)) from None
+        connection = TcpNetwork().connect(address.host, address.ports.secondary, 2.0)
+        connection.send(program.encode("latin-1", "replace") + b"\n")
+        connection.close()
 
     # --- an emulated box
 
     def operate(self, operation: str, **arguments: Any) -> dict[str, Any]:
-        """Have an operation of the control API done. HandError if it was not, with what the box says."""
+        """Have an operation of the control API done."""
         self._check()
         address = self._robot.address
-        if not address.control_port:
-            raise HandError("only the control API of a box can do this: serve it with --control-port")
         client = ControlClient(address.host, address.control_port, address.token)
-        try:
-            return client.perform(make(operation, arguments))
-        except EmulatorError as error:
-            raise HandError(str(error)) from None
+        return client.perform(make(operation, arguments))
 
     def let_pass(self, seconds: float) -> None:
-        """Let time of a box in lockstep pass, which stands still while nothing moves. HandError if not."""
+        """Let time of a box in lockstep pass, which stands still while nothing moves."""
         state = self._robot.state
         if state is not None:
             self.operate("wait_until", time=state.time + seconds)
@@ -150,13 +137,8 @@ class Hands:
         return np.array(follower.goal) if follower is not None and follower.is_alive() else None
 
     def _check(self) -> None:
-        """Raise HandError for a robot that is only shown."""
-        if not self._robot.is_held:
-            raise HandError(
-                "this window only shows the robot: it does not say that it is simulated"
-                if not self._robot.view_only
-                else "this window only shows the robot"
-            )
+        if self._robot.refusal:
+            raise HandError(self._robot.refusal)
 
 
 class Errands:

@@ -176,10 +176,8 @@ class Panel:
 
     def update(self) -> None:
         """Show what is new; call it 30 times a second, after the drawing's."""
-        access = (
-            Access.PENDANT + bool(self._robot.address.control_port) if self._robot.is_held else Access.NONE
-        )
-        wanted = Access(access), self._drawing.arm
+        may = Access.BOX if self._robot.address.control_port else Access.PENDANT
+        wanted = Access.NONE if self._robot.refusal else may, self._drawing.arm
         if self._controls is None or self._controls.made_for != wanted:
             if self._controls is not None:
                 self._controls.remove()
@@ -248,8 +246,7 @@ class Controls:
     def _make_keys(self) -> None:
         robot, hands, gui, is_box = self._robot, self._hands, self._gui, self._access is Access.BOX
         if self._access is Access.NONE:
-            reason = "is only shown" if robot.view_only else "does not say that it is simulated"
-            self._texts({"Controls": lambda robot: f"none: the robot {reason}"})
+            self._texts({"Controls": lambda robot: f"none: {robot.refusal}"})
         self._texts(ABOUT)
         if self._access is Access.NONE or robot.info is None:
             return

@@ -133,7 +133,7 @@ class Robot:
     """
 
     def __init__(self, address: Address, *, view_only: bool = False) -> None:
-        """Begin to read; `view_only`: nobody holds it, whatever it is."""
+        """Begin to read; `view_only`: nobody may do something to it, whatever it is."""
         self.address = address
         self.view_only = view_only
         self.problem = "connecting"
@@ -156,9 +156,12 @@ class Robot:
             thread.start()
 
     @property
-    def is_held(self) -> bool:
-        """Whether people may do something to it: only if it says that it is simulated."""
-        return not self.view_only and self.info is not None and self.info.simulated is True
+    def refusal(self) -> str:
+        """Why people may do nothing to it; "" if they may: it says that it is simulated."""
+        if self.view_only:
+            return "the robot is only shown"
+        is_simulated = self.info is not None and self.info.simulated is True
+        return "" if is_simulated else "the robot does not say that it is simulated"
 
     @property
     def title(self) -> str:

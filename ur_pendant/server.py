@@ -134,8 +134,7 @@ class PageServer(viser.ViserServer):  # type: ignore[misc]  # viser has no types
 
     def stop(self) -> None:
         """Close all pages."""
-        with suppress(RuntimeError):  # it has been stopped
-            self._gate.call_soon_threadsafe(self._ended.set)
+        self._gate.call_soon_threadsafe(self._ended.set)
         self._thread.join()
         with redirect_stdout(None):
             super().stop()

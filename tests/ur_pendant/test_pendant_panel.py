@@ -16,18 +16,16 @@ from pc_client.kinematics.arms import ROBOTS
 from pc_client.kinematics.model import robot_model, tcp_pose
 from protocol.pose import pose_to_T
 from protocol.ur_types import Ports, ProgramState, RobotMode, SafetyMode, SoftwareVersion
-from ur_emulator import ControlBox
 from ur_emulator.errors import ArgumentError
 from ur_emulator.host.control_api.box_state import Question
 from ur_emulator.host.control_api.operations import make
 from ur_emulator.machine.commands.surroundings import MAX_FORCE
 from ur_emulator.machine.models.things import BodyShape
-from ur_pendant import hands
 from ur_pendant.drawing import RobotDrawing
 from ur_pendant.guiding import AHEAD, JUMP, STIFFNESS, jogged, pulled, reached
 from ur_pendant.hands import HandError
 from ur_pendant.panel import FREEDRIVE, LINES, ROWS, Panel, columns
-from ur_pendant.robot import PLOTTED, Address, Robot, Sample, plain
+from ur_pendant.robot import PLOTTED, Address, Sample, plain
 
 Q, ZEROS, TURN = (0.3, -1.7, -2.0, -0.2, 1.4, 1.8), (0.0,) * 6, np.eye(6)[0]
 HOSTILE = "<img src=x onerror=alert(1)>\n\x00\x1b[31m\u202e\ud800" + "x" * 10_000
@@ -93,7 +91,7 @@ def a_robot(**changes):
         "target_speed_fraction": 0.5, "script_control_line": 0, "tcp_offset": TCP,
     }  # fmt: skip
     robot = {
-        "is_held": True, "view_only": False, "problem": "", "title": "UR5e 5.15.0 at 127.0.0.1", "values": values,
+        "refusal": "", "problem": "", "title": "UR5e 5.15.0 at 127.0.0.1", "values": values,
         "info": SimpleNamespace(version=SoftwareVersion(5, 15), model="UR5e", lockstep=False), "kinematics": None,
         "state": None, "address": Address("127.0.0.1", Ports(), 29900), "log": deque(), "history": deque(), "popups": (),
         "questions": (), "program": "", "label": "", "variables": {},
@@ -182,14 +180,14 @@ def window(server):
 
 
 def test_a_robot_that_is_not_held_has_values_and_no_controls_until_it_is(server):
-    window = Window(server, a_robot(is_held=False), Hands())
-    assert window.control("Controls").value == "none: the robot does not say that it is simulated"
+    window = Window(server, a_robot(refusal="the robot is only shown"), Hands())
+    assert window.control("Controls").value == "none: the robot is only shown"
     assert window.control("Mode").value == "RUNNING"
     free = {"Pause", "Signal", "Filter"}  # of the page only
     assert all(handle.disabled for handle in window.controls() if handle.label not in free)
     assert window.guiding is None
     for is_held in (True, False):
-        window.robot.is_held = is_held
+        window.robot.refusal = "" if is_held else "lost"
         window.update()
         assert ({"Power", "Emergency", "base +", "Put obstacle"} <= window.labels()) is is_held
         assert ("Controls" in window.labels()) is not is_held
@@ -509,7 +507,7 @@ def test_the_tool_is_pulled_at_too(window):
     window.update()
     hand, wall = window.drawing._shapes.values()
     assert (hand._has_any_drag_callbacks(), wall._has_any_drag_callbacks()) == (True, False)
-    window.robot.is_held = False
+    window.robot.refusal = "lost"
     window.update()
     assert not hand._has_any_drag_callbacks()
 
@@ -518,7 +516,7 @@ def test_the_tool_is_pulled_at_too(window):
 
 
 def test_what_a_robot_does_not_report_is_empty(server):
-    window = Window(server, a_robot(is_held=False, values={}, info=None), Hands())
+    window = Window(server, a_robot(refusal="lost", values={}, info=None), Hands())
     assert {window.control(label).value for label in ("Mode", "TCP mm", *LINES)} == {""}
     assert window.control("Program").value == "none ()"
 
@@ -533,18 +531,3 @@ def test_plots_have_as_many_lines_at_any_time():
         assert data[0].tolist() == [-3.0, -2.0, -1.0, 0.0]
     assert columns(samples, signals["actual_q"], 3.0)[6].tolist()[:3] == [0.0, 1.0, 2.0]
     assert len(columns([], signals["actual_q"], 3.0)) == 7
-
-
-def test_a_real_box_is_held(server):
-    """Values come, and a key acts."""
-    with ControlBox("ur5e", pace="lockstep", port_base=None, control_port=0) as box:
-        robot = Robot(Address("127.0.0.1", box.ports, box.control_port))
-        try:
-            while not (robot.is_held and robot.values and robot.state):
-                sleep(0.01)
-            window = Window(server, robot, hands.Hands(robot))
-            assert window.control("Robot").value.startswith("UR5e")
-            window.use("Emergency", "Emergency stop")
-            box.wait_until(safety_mode="ROBOT_EMERGENCY_STOP")
-        finally:
-            robot.close()
