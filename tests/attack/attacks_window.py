@@ -20,7 +20,7 @@ from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
 from ur_emulator.host.control_api.http_client import ControlClient
-from ur_emulator.host.control_api.step_operations import ReadState
+from ur_emulator.host.control_api.operations import make
 from ur_pendant.server import MOST_PAGES
 
 WINDOW = Section("The window of a box")
@@ -35,7 +35,7 @@ def _window(box: BoxUnderAttack) -> Iterator[int]:
     """A window that shows the box, before and after; gives its port."""
 
     def readers() -> int:
-        clients = ControlClient(box.host, CONTROL_PORT, None).perform(ReadState())["clients"]
+        clients = ControlClient(box.host, CONTROL_PORT, None).perform(make("state", {}))["clients"]
         return sum(" at rtde " in client or " at primary " in client for client in clients)
 
     def shows() -> bool:
