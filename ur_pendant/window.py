@@ -75,6 +75,7 @@ def show_recordings(files: Sequence[str], save: str | None, port: int) -> None:
         _serve(server, [window.update])
     else:
         window.save_page(server, Path(save))
+        server.stop()
         print(f"page: {save}")
 
 

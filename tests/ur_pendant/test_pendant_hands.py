@@ -42,7 +42,7 @@ def robot(box):
 
 
 def test_a_robot_is_read_by_rtde_the_primary_port_and_the_control_api(box, robot):
-    assert (robot.info.model, robot.problem) == ("UR5e", "")
+    assert (robot.title, robot.problem) == (f"UR5e 5.15.0 at {box.host}", "")
     assert robot.values["actual_q"] == box.state.q
     assert robot.kinematics.dh_a[1] == pytest.approx(-0.425, abs=0.005)
     box.run_program('def asks():\n  request_integer_from_primary_client("how many?")\nend\n')

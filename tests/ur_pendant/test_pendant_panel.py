@@ -3,7 +3,8 @@
 from collections import deque
 from concurrent.futures import Future
 from contextlib import suppress
-from time import sleep
+from functools import partialmethod
+from time import monotonic, sleep
 from types import SimpleNamespace
 
 import numpy as np
@@ -57,11 +58,10 @@ class Hands:
             raise HandError(str(error)) from None
         self._do(operation, arguments)
 
-    def tell_dashboard(self, line):
-        self._do("tell_dashboard", line)
+    def let_pass(self, seconds):
+        self.operate("wait_until", time=seconds)
 
-    def run(self, program):
-        self._do("run", program)
+    tell_dashboard, run = partialmethod(_do, "tell_dashboard"), partialmethod(_do, "run")
 
     def follow(self, q):
         self._do("follow", tuple(np.round(q, 6)))
@@ -196,7 +196,7 @@ def test_a_robot_that_is_not_held_has_values_and_no_controls_until_it_is(server)
 
 @pytest.mark.parametrize(("major", "has_api"), [(3, True), (5, True), (5, False)])
 def test_every_key_does_what_it_says_where_the_robot_has_it(server, major, has_api):
-    info = SimpleNamespace(version=SoftwareVersion(major, 15), model="UR5e", lockstep=False)
+    info = SimpleNamespace(version=SoftwareVersion(major, 15), model="UR5e", lockstep=True, period=0.002)
     window = Window(server, a_robot(info=info, address=Address("", Ports(), 29900 * has_api)), Hands())
     rows = {handle.label: handle for handle in window.controls() if hasattr(handle, "options")}
     for label, since, deeds in ROWS:
@@ -206,6 +206,8 @@ def test_every_key_does_what_it_says_where_the_robot_has_it(server, major, has_a
     done = window.hands.done
     assert len({what for what in done if what[0] == "press"}) == 9
     assert has_api or len(done) == 9
+    window.use("Time", "One cycle") if has_api else None
+    assert (("wait_until", {"time": 0.002}) in done) is has_api
     assert (("enabling_device", {"position": "fully pressed"}) in done) is (has_api and major >= 5)
 
 
@@ -301,8 +303,9 @@ def test_hostile_texts_are_shown_as_text(window):
     assert len(window.control("Log").value.splitlines()) == 10
 
 
-def test_popups_and_questions_until_they_are_gone(window):
+def test_popups_and_questions_until_they_are_gone(window, monkeypatch):
     robot = window.robot
+    monkeypatch.setattr(window.server, "get_clients", lambda: {1: window.client})
     asked = [("BOOLEAN", "yes", True), ("INTEGER", "7", 7), ("FLOAT", "2.5", 2.5), ("STRING", "a", "a")]
     for k, (kind, text, value) in enumerate(asked):
         robot.questions = (Question(k + 1, kind, "how?"),)
@@ -315,6 +318,7 @@ def test_popups_and_questions_until_they_are_gone(window):
     window.update()
     window.use("Integer", "many")
     window.use("Answer")
+    assert ("A program says", "how many?") in window.told
     assert "many" in dict(window.told)["Not done"]
     robot.questions, robot.popups = (), ("look",)
     window.update()
@@ -521,7 +525,7 @@ def test_what_a_robot_does_not_report_is_empty(server):
     assert window.control("Program").value == "none ()"
 
 
-def test_plots_have_as_many_lines_at_any_time():
+def test_plots_have_as_many_lines_at_any_time(window, monkeypatch):
     samples = [Sample(float(k), {"actual_q": (float(k),) * 6, "speed_scaling": 0.5}) for k in range(3)]
     samples.append(Sample(3.0, {}))
     signals = {signal.name: signal for signal in PLOTTED}
@@ -531,3 +535,14 @@ def test_plots_have_as_many_lines_at_any_time():
         assert data[0].tolist() == [-3.0, -2.0, -1.0, 0.0]
     assert columns(samples, signals["actual_q"], 3.0)[6].tolist()[:3] == [0.0, 1.0, 2.0]
     assert len(columns([], signals["actual_q"], 3.0)) == 7
+    window.robot.history.extend(
+        Sample(monotonic() - 1.0 + k / 60, sample.values) for k, sample in enumerate(samples)
+    )
+    window.update()
+    charts = window.panel._controls._charts
+    assert [plot.title for _, plot in charts] == [None, None]  # nobody looks
+    monkeypatch.setattr(window.server, "get_clients", lambda: {1: window.client})
+    window.update()
+    window.update()
+    assert [plot.title for _, plot in charts] == ["actual_q [rad]", "actual_TCP_force [N, Nm]"]
+    assert charts[0][1].data[1].size in (1, 2, 3)  # every other one

@@ -1,14 +1,13 @@
 """Recordings in a window: the moment that is shown, the page without a server, and the commands that open them."""
 
 import json
-import subprocess
-import sys
 import urllib.request
 
 import numpy as np
 import pytest
 
 import pc_client as ur
+from pc_client.__main__ import main
 from ur_emulator import ControlBox
 from ur_pendant import window
 from ur_pendant.recordings import RecordingsWindow, load_track
@@ -59,13 +58,17 @@ def test_it_plays_at_a_speed_and_begins_again(run, server, monkeypatch):
     assert window._bar.value == pytest.approx(track.run.t[0], abs=1e-3)
 
 
-def test_a_page_needs_no_server(run, tmp_path):
+def test_a_page_needs_no_server(run, tmp_path, monkeypatch, capsys):
+    def become(_, command):
+        monkeypatch.setattr("sys.argv", command[2:])
+        window.main()
+
     page = tmp_path / "page.html"
-    words = ["view", str(run.recording.path), "--save", str(page)]
-    done = subprocess.run(
-        [sys.executable, "-m", "pc_client", *words], capture_output=True, text=True, check=True
-    )
-    assert done.stdout == f"page: {page}\n"
+    monkeypatch.setattr("os.execv", become)
+    monkeypatch.setattr("sys.argv", ["ur-client", "view", str(run.recording.path), "--save", str(page)])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert (ended.value.code, capsys.readouterr().out) == (0, f"page: {page}\n")
     assert page.read_text().lstrip().lower().startswith("<!doctype html>")
 
 
