@@ -1,5 +1,6 @@
 """The panel on a real server of viser, whose callbacks are called as viser does it; robot and hands are recorded."""
 
+import asyncio
 from collections import deque
 from concurrent.futures import Future
 from contextlib import suppress
@@ -244,6 +245,7 @@ def test_controls_follow_the_robot_and_nobody_is_asked(window):
     window.update()
     assert window.control("Speed %").value == 20
     assert window.control("In, standard").options[:4] == ("0 ○", "1 ●", "2 ●", "3 ○")
+    asyncio.run_coroutine_threadsafe(asyncio.sleep(0), window.server._event_loop).result()  # viser calls back
     window.work()
     assert window.hands.done == []
 
@@ -398,7 +400,7 @@ def test_jogging_keeps_near_and_within_the_limits(goal, q, joint, step):
 
 def drag(window, phase, T):
     frame = window.guiding.frame
-    frame._impl.position, frame._impl.wxyz = T[:3, 3], np.roll(pin.Quaternion(T[:3, :3]).coeffs(), 1)
+    frame._impl.position, frame._impl.wxyz = T[:3, 3].copy(), np.roll(pin.Quaternion(T[:3, :3]).coeffs(), 1)
     window.happens(frame._impl_aux.update_cb, frame, phase=phase)
 
 

@@ -118,6 +118,8 @@ def page(address):
 def test_a_websocket_that_did_not_come_through_the_gate_is_closed_before_anything_is_sent(server):
     with page(server.address) as one:
         assert one.recv()
+    status, body, _ = get(server, **UPGRADE | {"Sec-WebSocket-Protocol": "viser-v0.1"})
+    assert (status, body) == (403, "the page is of another version of viser: load it again\n")
     with page(("127.0.0.1", server.get_port())) as one, pytest.raises(ConnectionClosedError):
         one.recv()
 
