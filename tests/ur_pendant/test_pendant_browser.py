@@ -10,17 +10,12 @@ import sys
 import time
 from contextlib import contextmanager
 from functools import partial
-from io import BytesIO
-from math import dist
 
-import numpy as np
 import pytest
-from PIL import Image
 
 from ur_emulator import ControlBox
 
 webdriver = pytest.importorskip("selenium.webdriver")
-ActionBuilder = pytest.importorskip("selenium.webdriver.common.actions.action_builder").ActionBuilder
 CHROMIUM, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
 pytestmark = [
     pytest.mark.slow,
@@ -149,44 +144,6 @@ def test_keys_act_on_the_box_and_a_joint_goes_as_long_as_its_button_is_held(box,
     )
     own = page.driver.current_url
     assert all(name.startswith((own, "data:", "blob:")) for name in loaded)  # nothing of the network
-
-
-@pytest.mark.nightly
-def test_the_tool_is_dragged_by_the_mouse(box, page):
-    """The arm follows an arrow of its frame, which turns yellow below the mouse."""
-
-    def blue():
-        """Pixels (n, 2) of the z axis of the frame, left of the panel."""
-        picture = Image.open(BytesIO(page.driver.get_screenshot_as_png())).convert("RGB")
-        found = np.abs(np.asarray(picture, int) - (44, 143, 223)).sum(axis=2) < 80
-        return np.argwhere(found[:, :1000])[:, ::-1]
-
-    def tip():
-        """The head of the arrow, which is the lowest part of it."""
-        found = blue()
-        return found[found[:, 1] > found[:, 1].max() - 8].mean(axis=0) if len(found) else np.full(2, np.nan)
-
-    page.tab("Move")
-    page.until(lambda: dist(tip(), tip()) < 1.0, "the frame rests")
-    x, y = np.rint(tip()).astype(int).tolist()
-    before = box.state.tcp_pose
-
-    def mouse(*moves):
-        actions = ActionBuilder(page.driver)
-        for move in moves:
-            move(actions.pointer_action)
-        actions.perform()
-
-    def to(row):
-        return lambda pointer: pointer.move_to_location(x, row)
-
-    mouse(to(y))
-    page.until(lambda: (x, y) not in map(tuple, blue()), "the arrow is yellow")
-    mouse(lambda pointer: pointer.pointer_down(), *(to(y - 3 * step) for step in range(12)))
-    page.until(lambda: dist(box.state.tcp_pose[:3], before[:3]) > 0.03, "the arm follows")
-    mouse(lambda pointer: pointer.pointer_up())
-    box.wait_until(program_state="STOPPED", steady=True, timeout=LIMIT)
-    assert box.state.tcp_pose[3:] == pytest.approx(before[3:], abs=0.01)
 
 
 HOSTILE = "<img src=x onerror=\\\"document.title='owned'\\\"><b>bold</b> [link](javascript:alert(1))"
