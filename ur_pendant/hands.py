@@ -156,7 +156,8 @@ class Errands:
         self._told_at = 0.0
 
     def begin(self, client: Any, errand: Errand) -> None:
-        """Begin an errand in a thread of its own, whatever the window or other errands wait for."""
+        """Begin an errand in a thread of its own, whatever the window waits for, and forget those that wait."""
+        self._events.put(self._waiting.clear)
         Thread(target=self._run, args=(client, errand), daemon=True).start()
 
     def ask(self, client: Any, errand: Errand, kind: str = "") -> None:
@@ -223,9 +224,9 @@ class Follower(Thread):
                     stream.send((counter, *numbers(values, "target_q")))
                     stream.receive()
                 run(_program(first))
-            except ClientError as error:
+            except ClientError:
                 _check_rest(robot.values)  # as another window, which writes to the inputs: its program runs
-                raise HandError(str(error)) from None
+                raise
             failing.pop_all()
         self.start()
 

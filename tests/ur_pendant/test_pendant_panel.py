@@ -335,18 +335,6 @@ def test_popups_and_questions_until_they_are_gone(window, monkeypatch):
     assert "Text" not in window.labels()
 
 
-def test_the_emergency_stop_waits_for_nothing(window):
-    """The window's thread takes nothing, nor do other errands begin, and a second click comes at once."""
-    window.happens(window.control("Power")._impl.update_cb, window.control("Power"))
-    row = window.control("Emergency")
-    for button in ("Emergency stop", "Release"):
-        row._impl.value = button
-        window.happens(row._impl.update_cb, row)
-    while len(window.hands.done) < 2:
-        sleep(0.001)
-    assert {what[0] for what in window.hands.done} == {"emergency_stop", "release_emergency_stop"}
-
-
 # --- moving
 
 
@@ -442,6 +430,21 @@ def test_the_last_pose_of_a_drag_arrives_however_busy_window_and_robot_are(windo
     window.work()
     assert len(window.hands.done) == 2  # the first, and what came last while it was done
     assert window.hands.goal == pytest.approx(Q + 1.6 * TURN, abs=1e-4)
+
+
+def test_the_emergency_stop_waits_for_nothing_and_what_waits_is_forgotten(window):
+    """The window's thread takes nothing, no other errand begins, and a second click comes at once."""
+    for phase in ("start", "update", "update", "end"):
+        drag(window, phase, window.drawing.T_base_tcp)
+    row = window.control("Emergency")
+    for button in ("Emergency stop", "Release"):
+        row._impl.value = button
+        window.happens(row._impl.update_cb, row)
+    while len(window.hands.done) < 2:
+        sleep(0.001)
+    assert {what[0] for what in window.hands.done} == {"emergency_stop", "release_emergency_stop"}
+    window.work()
+    assert [what[0] for what in window.hands.done[2:]] == ["follow"]  # which had begun
 
 
 def test_no_frame_to_drag_while_a_program_has_the_arm(window):
