@@ -156,7 +156,7 @@ class Errands:
         self._told_at = 0.0
 
     def begin(self, client: Any, errand: Errand) -> None:
-        """Begin an errand in a thread of its own, whatever the window waits for, and forget those that wait."""
+        """Begin an errand in a thread of its own, whatever else is done, and forget those that wait."""
         self._events.put(self._waiting.clear)
         Thread(target=self._run, args=(client, errand), daemon=True).start()
 

@@ -92,9 +92,9 @@ class RecordingsWindow:
             name, colour = _COLOURS[k % len(_COLOURS)]
             self._arms.append(self._draw(server.scene, k, track, colour))
             gui.add_text(name, initial_value=track.title[:200], disabled=True)
-            speeds.append(_Curve("reference", _GREY, track.run.t, track.desired_speed))
-            speeds.append(_Curve(name, colour, track.run.t, track.run.tcp_speed))
-            errors.append(_Curve(name, colour, track.run.t, track.error))
+            speeds.append(("reference", _GREY, track.run.t, track.desired_speed))
+            speeds.append((name, colour, track.run.t, track.run.tcp_speed))
+            errors.append((name, colour, track.run.t, track.error))
         begin = max(0.0, self._begin)
         self._bar = gui.add_slider("time [s]", self._begin, self._end, 0.001, begin)
         self._plays = gui.add_checkbox("play", initial_value=False)
@@ -151,22 +151,17 @@ class RecordingsWindow:
         return actual, ArmDrawing(scene, f"{root}/desired", track.model, _GREY, 0.25)
 
 
-class _Curve(NamedTuple):
-    label: str
-    colour: Colour
-    t: Array
-    values: Array
-
-
 class _Plot:
-    """Curves against time, and a line at the moment that is shown."""
+    """Curves (label, colour, times, values), and a line at the moment that is shown."""
 
-    def __init__(self, gui: viser.GuiApi, title: str, curves: Sequence[_Curve]) -> None:
-        begin, end = min(curve.t[0] for curve in curves), max(curve.t[-1] for curve in curves)
-        self._t = np.linspace(begin, end, _MOST_POINTS)
-        self._rows = [np.interp(self._t, curve.t, curve.values) for curve in curves]
+    def __init__(
+        self, gui: viser.GuiApi, title: str, curves: Sequence[tuple[str, Colour, Array, Array]]
+    ) -> None:
+        times = [t for _, _, t, _ in curves]
+        self._t = np.linspace(min(t[0] for t in times), max(t[-1] for t in times), _MOST_POINTS)
+        self._rows = [np.interp(self._t, t, values) for _, _, t, values in curves]
         self._shown = -1
-        drawn = [{"label": curve.label, "stroke": f"rgb{curve.colour}"} for curve in curves]
+        drawn = [{"label": label, "stroke": f"rgb{colour}"} for label, colour, _, _ in curves]
         self._plot = gui.add_uplot(
             (self._t, *self._rows, np.zeros_like(self._t)),
             ({"label": "t"}, *drawn, {"label": "now", "stroke": "black"}),

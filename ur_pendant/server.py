@@ -180,6 +180,8 @@ class PageServer(viser.ViserServer):  # type: ignore[misc]  # viser has no types
                     self._pages -= is_page
         except (OSError, asyncio.IncompleteReadError, asyncio.LimitOverrunError, MultipleValuesError):
             pass  # it is no request, or the page is gone
+        except asyncio.CancelledError:
+            pass  # the server stops; asyncio would print it
         finally:
             writer.close()
 

@@ -137,6 +137,7 @@ def test_keys_act_on_the_box_and_a_joint_goes_as_long_as_its_button_is_held(box,
     page.button("Release").click()
     box.wait_until(safety_mode="NORMAL", timeout=LIMIT)
     box.release_brakes()
+    box.wait_until(robot_mode="RUNNING", timeout=LIMIT)
     page.tab("Robot")
     page.shows("none (stopped)")
     loaded = page.driver.execute_script(
@@ -166,7 +167,6 @@ def test_what_programs_say_is_text(box, page):
 @pytest.mark.nightly
 def test_a_question_is_answered(box, page):
     program = 'def asks():\n  textmsg("it is ", request_integer_from_primary_client("how many?"))\nend\n'
-    box.wait_until(robot_mode="RUNNING", timeout=LIMIT)
     box.run_program(program)
     page.shows("how many?")
     (field,) = page.find("//label[normalize-space()='Integer']/following::input[1]")

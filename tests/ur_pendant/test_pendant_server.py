@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import viser
 from viser._messages import ShareUrlDisconnect, ShareUrlRequest
-from websockets.exceptions import ConnectionClosedError
+from websockets.exceptions import ConnectionClosed, ConnectionClosedError
 from websockets.sync.client import connect
 
 from ur_pendant.server import PageServer, WindowError
@@ -122,6 +122,18 @@ def test_a_websocket_that_did_not_come_through_the_gate_is_closed_before_anythin
     assert (status, body) == (403, "the page is of another version of viser: load it again\n")
     with page(("127.0.0.1", server.get_port())) as one, pytest.raises(ConnectionClosedError):
         one.recv()
+
+
+def test_a_server_that_stops_closes_its_pages_without_a_word(caplog):
+    server = PageServer("127.0.0.1", 0, None, "test")
+    with page(server.address) as one, socket.create_connection(server.address) as silent:
+        assert one.recv()
+        server.stop()
+        assert silent.recv(1) == b""
+        with pytest.raises(ConnectionClosed):
+            while True:
+                one.recv()
+    assert not [record for record in caplog.records if record.name == "asyncio"]
 
 
 def test_so_many_pages_may_be_open_at_once(server, monkeypatch):
