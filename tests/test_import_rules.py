@@ -40,7 +40,15 @@ MAY_HAVE_EFFECTS = {
         "recording/recorder.py",
         "results/window.py",
     },
-    "ur_pendant": {"robot.py", "hands.py", "server.py", "panel.py", "recordings.py", "window.py"},
+    "ur_pendant": {
+        "robot.py",
+        "hands.py",
+        "guiding.py",
+        "server.py",
+        "panel.py",
+        "recordings.py",
+        "window.py",
+    },
 }
 # Inside a package: each part imports those before it, also for types only; those on one line import each other.
 BOX_ORDER = (

@@ -89,7 +89,7 @@ def _links(description: RobotDescription) -> tuple[tuple[_Mesh, _Mesh | None], .
     """Housing and lids of each link, base to wrist 3, in the frame of its joint; shared, never changed."""
     model, geometry = load_pinocchio_model(description), description.geometry
     if not isinstance(geometry, DhArm):
-        return tuple((_published(mesh), None) for mesh in load_meshes(geometry, model))
+        return tuple((_published(link), None) for link in load_meshes(geometry, model))
     links = []
     for name, rings in housings(geometry).items():
         centres = [ring.mean(axis=0) for ring in rings]

@@ -10,7 +10,6 @@ import threading
 import time
 from collections import deque
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
 from itertools import count
 from types import MappingProxyType
 from typing import NamedTuple
@@ -42,16 +41,14 @@ from ur_emulator.host.control_api.step_operations import ReadLog, ReadState
 RATE = 30.0
 """Packages a second that RTDE is asked for: a screen shows twice as many at best."""
 
-_SLOWLY, _LOG_EVERY = 0.2, 3
-"""Between two questions to the control API [s]; every third time it is asked for the log, too."""
-
-_PAUSE = 1.0
-"""Before the next try when a robot does not answer [s]."""
-
-_HISTORY = 60.0
-"""How long signals are kept [s]."""
-
+_SLOWLY, _LOG_EVERY = (
+    0.2,
+    3,
+)  # Between two questions to the control API [s]; how often one is for the log, too.
+_PAUSE = 1.0  # Before the next try when a robot does not answer [s].
+_HISTORY = 60.0  # How long signals are kept [s].
 _LOG_LINES = 200
+_LONGEST = 160  # Of a text that is shown [characters].
 
 
 class Signal(NamedTuple):
@@ -81,9 +78,6 @@ PLOTTED = (
 )
 """Signals that are numbers over time."""
 
-_INTEGER_REGISTERS = tuple(f"output_int_register_{i}" for i in range(4))
-_DOUBLE_REGISTERS = tuple(f"output_double_register_{i}" for i in range(4))
-
 OUTPUTS = (
     "timestamp",
     *(signal.name for signal in PLOTTED),
@@ -96,38 +90,21 @@ OUTPUTS = (
     "payload",
     "actual_digital_input_bits",
     "actual_digital_output_bits",
-    "standard_analog_input0",
-    "standard_analog_input1",
-    "standard_analog_output0",
-    "standard_analog_output1",
+    *(f"standard_analog_{way}{k}" for way in ("input", "output") for k in range(2)),
     "tool_output_voltage",
     "script_control_line",
-    *_INTEGER_REGISTERS,
-    *_DOUBLE_REGISTERS,
+    *(f"output_{kind}_register_{k}" for kind in ("int", "double") for k in range(4)),
 )
 """What RTDE is asked for; a robot leaves out what its software does not know."""
 
 
-@dataclass(frozen=True, slots=True)
-class Address:
-    """Where a robot is.
-
-    Attributes:
-        control_port: of the control API of an emulated box; 0 without one.
-        token: of that port.
-    """
+class Address(NamedTuple):
+    """Where a robot is; `control_port` and `token` are of the control API of an emulated box that has one."""
 
     host: str
     ports: Ports
     control_port: int = 0
     token: str | None = None
-
-
-class LogLine(NamedTuple):
-    """A line of the log, and the robot's time [s]."""
-
-    time: float
-    text: str
 
 
 class Sample(NamedTuple):
@@ -147,7 +124,7 @@ class Robot:
         values: signals by name; empty before the first.
         history: samples of the last minute, the oldest first.
         state: of an emulated box with a control port, without which it is None.
-        log: the last lines, the oldest first.
+        log: times [s] and texts of the last lines, the oldest first.
         popups: texts of the popups that are shown.
         questions: of programs, which wait for an answer.
         program: name of the program that runs, "" without one.
@@ -156,7 +133,7 @@ class Robot:
     """
 
     def __init__(self, address: Address, *, view_only: bool = False) -> None:
-        """Begin to read; `view_only`: nobody holds it, whatever it is."""
+        """Begin to read; `view_only`: nobody may do something to it, whatever it is."""
         self.address = address
         self.view_only = view_only
         self.problem = "connecting"
@@ -165,7 +142,7 @@ class Robot:
         self.values: RtdeValues = MappingProxyType({})
         self.history: deque[Sample] = deque(maxlen=round(RATE * _HISTORY))
         self.state: BoxState | None = None
-        self.log: deque[LogLine] = deque(maxlen=_LOG_LINES)
+        self.log: deque[tuple[float, str]] = deque(maxlen=_LOG_LINES)
         self.popups: tuple[str, ...] = ()
         self.questions: tuple[Question, ...] = ()
         self.program = ""
@@ -179,9 +156,12 @@ class Robot:
             thread.start()
 
     @property
-    def is_held(self) -> bool:
-        """Whether people may do something to it: only if it says that it is simulated."""
-        return not self.view_only and self.info is not None and self.info.simulated is True
+    def refusal(self) -> str:
+        """Why people may do nothing to it; "" if they may: it says that it is simulated."""
+        if self.view_only:
+            return "the robot is only shown"
+        is_simulated = self.info is not None and self.info.simulated is True
+        return "" if is_simulated else "the robot does not say that it is simulated"
 
     @property
     def title(self) -> str:
@@ -229,7 +209,7 @@ class Robot:
         for message in primary.poll():
             text = _line_of(message)
             if text is not None and not has_state:
-                self.log.append(LogLine(1e-6 * message.timestamp, text))
+                self.log.append((1e-6 * message.timestamp, text))
             match message:
                 case KeyMessage(title=KeyMessage.STARTED, text=name):
                     self.program, self.label = name, ""
@@ -254,12 +234,12 @@ class Robot:
                     box, seen = AttachedBox(at.host, at.control_port, at.token), 0
                     self.log.clear()
                     # Which ports it has: that of the dashboard server is not there with PolyScope X.
-                    self.address = replace(at, ports=box.served[0].ports)
+                    self.address = at._replace(ports=box.served[0].ports)
                 state: BoxState = box.perform(0, ReadState())
                 if next(turns) % _LOG_EVERY == 0:
                     news = box.perform(0, ReadLog(after=seen))
                     seen = news["next"]
-                    self.log.extend(LogLine(entry["time"], entry["text"]) for entry in news["entries"])
+                    self.log.extend((entry["time"], entry["text"]) for entry in news["entries"])
             except EmulatorError:
                 self.state, box = None, None
                 self._closed.wait(_PAUSE)
@@ -282,3 +262,15 @@ def _line_of(message: RobotMessage) -> str | None:
         case PopupMessage():
             return f"{message.title}: {message.text}"
     return None
+
+
+def numbers(values: RtdeValues, name: str) -> tuple[float, ...]:
+    """Return a signal as numbers; none if it is not reported."""
+    value = values.get(name, ())
+    return tuple(map(float, value)) if isinstance(value, tuple) else (float(value),)
+
+
+def plain(text: str) -> str:
+    """Return text on one line, without what does not print, and cut."""
+    cut = text[:_LONGEST] + "…" * (len(text) > _LONGEST)
+    return cut if cut.isprintable() else "".join(c if c.isprintable() else " " for c in cut)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import os
 import signal
 import sys
@@ -25,12 +26,12 @@ from ur_pendant.drawing import RobotDrawing
 from ur_pendant.hands import Hands
 from ur_pendant.panel import Panel
 from ur_pendant.robot import RATE, Address, Robot
-from ur_pendant.server import PageServer, WindowError, open_server
+from ur_pendant.server import PageServer, WindowError
 
 _BESIDE = 1.3
 """From one arm to the next in a window of several [m]."""
 
-Update = Callable[[], None]
+Update = Callable[[], object]
 
 
 def show_robots(
@@ -45,7 +46,7 @@ def show_robots(
 ) -> None:
     """Show robots until the process is interrupted; options as of `ur-emulator pendant`."""
     ports, around = Ports.standard(port_base), surroundings(cell, tool)
-    server = open_server(listen, port, os.environ.get(PAGE_TOKEN_VARIABLE), "UR")
+    server = PageServer(listen, port, os.environ.get(PAGE_TOKEN_VARIABLE), "UR")
     controls = [*control_ports, *[0] * len(hosts)]
     robots: list[Robot] = []
     updates: list[Update] = []
@@ -68,46 +69,51 @@ def show_recordings(files: Sequence[str], save: str | None, port: int) -> None:
     from ur_pendant.recordings import RecordingsWindow, load_track  # with scipy, which the robots do not need
 
     tracks = [load_track(Path(file)) for file in files]
-    server = open_server("127.0.0.1", 0 if save is not None else port, None, "UR recordings")
+    server = PageServer("127.0.0.1", 0 if save is not None else port, None, "UR recordings")
     window = RecordingsWindow(server, tracks)
     if save is None:
         _serve(server, [window.update])
     else:
         window.save_page(server, Path(save))
+        server.stop()
         print(f"page: {save}")
 
 
 def _serve(server: PageServer, updates: list[Update]) -> None:
-    """Say where the window is, and update it thirty times a second until the process is interrupted."""
+    """Say where the window is; update it thirty times a second and take its events until an interrupt."""
+    logging.getLogger("websockets.server").disabled = True  # what pages send may be no message
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # as Ctrl-C: `serve` ends its window with it
     with suppress(KeyboardInterrupt):
         _announce(server)
         while updates:
-            begun = time.monotonic()
+            end = time.monotonic() + 1.0 / RATE
             with server.atomic():
                 for update in list(updates):
-                    _try(update, updates)
-            time.sleep(max(0.0, 1.0 / RATE - (time.monotonic() - begun)))
+                    if not _try(update, "a part of the window is shown no more"):
+                        updates.remove(update)
+            for handle in server.events.until(end):
+                _try(handle, "an event of a page has no effect")
     # Ctrl-C reaches this process and `serve`, which then ends it, too: once is enough.
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
     server.stop()
 
 
-def _try(update: Update, updates: list[Update]) -> None:
-    """Update a part; what one robot sends must not end the window on the others."""
+def _try(update: Update, consequence: str) -> bool:
+    """Whether it could be done; what one robot sends, or a page, must not end the window on the others."""
     try:
         update()
     except Exception as error:
-        updates.remove(update)
-        _complain(f"a part of the window is shown no more: {type(error).__name__}: {error}")
+        _complain(f"{consequence}: {type(error).__name__}: {error}")
+        return False
+    return True
 
 
 def _announce(server: PageServer) -> None:
     """Say where the window is; on a terminal, a line opens it."""
-    host = server.get_host()
+    host, port = server.address
     has_token = PAGE_TOKEN_VARIABLE in os.environ
-    url = f"http://{f'[{host}]' if ':' in host else host}:{server.get_port()}"
+    url = f"http://{f'[{host}]' if ':' in host else host}:{port}"
     on_terminal = not has_token and sys.stdin is not None and sys.stdin.isatty()
     more = "/?token=..." if has_token else "; press Enter to open it in the browser" if on_terminal else ""
     print(f"window at {url}{more}", flush=True)

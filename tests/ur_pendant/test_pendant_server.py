@@ -2,10 +2,20 @@
 
 import http.client
 import socket
+from contextlib import suppress
+from functools import partial
+from queue import SimpleQueue
+from time import monotonic
 
+import msgspec
+import numpy as np
 import pytest
+import viser
+from viser._messages import ShareUrlDisconnect, ShareUrlRequest
+from websockets.exceptions import ConnectionClosed, ConnectionClosedError
+from websockets.sync.client import connect
 
-from ur_pendant.server import WindowError, open_server
+from ur_pendant.server import PageServer, WindowError
 
 UPGRADE = {
     "Connection": "Upgrade",
@@ -15,16 +25,15 @@ UPGRADE = {
     "Sec-WebSocket-Protocol": "viser-v1.1.1",
 }
 
-
-@pytest.fixture(scope="module")
-def server():
-    server = open_server("127.0.0.1", 0, None, "test")
-    yield server
-    server.stop()
+X, Y, Z = np.eye(3).tolist()
+CAMERA = {
+    "wxyz": [1.0, 0.0, 0.0, 0.0], "position": X, "look_at": Y, "up_direction": Z, "fov": 1.0, "near": 0.1, "far": 9.0,
+    "image_width": 390, "image_height": 844,
+}  # fmt: skip
 
 
 def get(server, path="/", **headers):
-    connection = http.client.HTTPConnection("127.0.0.1", server.get_port(), timeout=20)
+    connection = http.client.HTTPConnection(*server.address, timeout=20)
     connection.request("GET", path, headers=headers)
     answer = connection.getresponse()
     if answer.status == 101:
@@ -62,7 +71,7 @@ def test_only_pages_of_this_machine_open_it(server, headers, upgrade, problem):
 
 
 def test_a_token_is_shown_once_and_kept_as_its_digest():
-    server = open_server("127.0.0.1", 0, 'a"to;ken', "test")
+    server = PageServer("127.0.0.1", 0, 'a"to;ken', "test")
     try:
         for path, cookie in (
             ("/", ""),
@@ -84,16 +93,96 @@ def test_a_token_is_shown_once_and_kept_as_its_digest():
 
 def test_other_addresses_need_a_token_and_a_taken_port_is_an_error(server):
     with pytest.raises(WindowError, match=r"--token.*ssh -L 29980:127.0.0.1:29980"):
-        open_server("0.0.0.0", 29980, None, "test")
+        PageServer("0.0.0.0", 29980, None, "test")
     with pytest.raises(WindowError, match="no blanks"):
-        open_server("127.0.0.1", 0, "a b", "test")
+        PageServer("127.0.0.1", 0, "a b", "test")
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
         with pytest.raises(WindowError, match=f"port {port} of 127.0.0.1 cannot be opened.*in use.*--port "):
-            open_server("127.0.0.1", port, None, "test")
+            PageServer("127.0.0.1", port, None, "test")
     with pytest.raises(WindowError, match=r"cannot be opened.*--listen.*--window-host"):
-        open_server("192.0.2.1", 0, "token", "test")
+        PageServer("192.0.2.1", 0, "token", "test")
 
 
 def test_nobody_can_publish_the_page(server):
-    assert server.request_share_url() is None
+    assert not {ShareUrlRequest, ShareUrlDisconnect} & set(server._websock_server._incoming_handlers)
+
+
+def page(address):
+    """A page's websocket, as its script opens it."""
+    host, port = address
+    return connect(
+        f"ws://{host}:{port}", subprotocols=[f"viser-v{viser.__version__}"], max_size=None, proxy=None
+    )
+
+
+def test_a_websocket_that_did_not_come_through_the_gate_is_closed_before_anything_is_sent(server):
+    with page(server.address) as one:
+        assert one.recv()
+    status, body, _ = get(server, **UPGRADE | {"Sec-WebSocket-Protocol": "viser-v0.1"})
+    assert (status, body) == (403, "the page is of another version of viser: load it again\n")
+    with page(("127.0.0.1", server.get_port())) as one, pytest.raises(ConnectionClosedError):
+        one.recv()
+
+
+def test_a_server_that_stops_closes_its_pages_without_a_word(caplog):
+    server = PageServer("127.0.0.1", 0, None, "test")
+    with page(server.address) as one:
+        assert one.recv()
+        server.stop()
+        with suppress(ConnectionClosed):
+            while True:
+                one.recv(timeout=20.0)
+    assert not [record for record in caplog.records if record.name == "asyncio"]
+
+
+def test_so_many_pages_may_be_open_at_once(server, monkeypatch):
+    monkeypatch.setattr("ur_pendant.server.MOST_PAGES", 2)
+    with page(server.address) as one, page(server.address) as other:
+        assert one.recv()
+        assert other.recv()
+        status, body, _ = get(server, **UPGRADE)
+        assert (status, body) == (403, "2 pages are open: close one\n")
+        assert get(server)[0] == 200
+
+
+def test_events_of_a_page_come_in_their_order_and_the_end_of_a_drag_with_its_pose(server):
+    frame = server.scene.add_transform_controls("/frame")
+    taken = SimpleQueue()
+    enter = server.events.entry(
+        lambda _, *what: taken.put(what), lambda event: (event.phase, frame.position[0])
+    )
+    frame.on_update(enter)
+
+    def send(kind, **more):
+        one.send(msgspec.msgpack.encode({"type": kind, **more}))
+
+    with page(server.address) as one:
+        send("ViewerCameraMessage", **CAMERA)
+        send("TransformControlsDragStartMessage", name="/frame")
+        for x in range(100):
+            send(
+                "TransformControlsUpdateMessage",
+                name="/frame",
+                wxyz=(1.0, 0.0, 0.0, 0.0),
+                position=(float(x), 0.0, 0.0),
+            )
+        send("TransformControlsDragEndMessage", name="/frame")
+        for handle in server.events.until(monotonic() + 20.0):
+            handle()
+            if taken.qsize() == 102:
+                break
+            client = next(iter(server.get_clients().values()), None)
+        assert client.camera.look_at.tolist() == [0.2, 0.0, -0.5]  # it is a phone
+    got = [taken.get() for _ in range(taken.qsize())]
+    assert got == [("start", 0.0), *(("update", float(x)) for x in range(100)), ("end", 99.0)]
+
+
+def test_events_that_wait_are_taken_also_by_a_window_that_is_late(server):
+    taken = []
+    for k in range(3):
+        server.events.put(partial(taken.append, k))
+    for handle in server.events.until(monotonic() - 1.0):
+        handle()
+        server.events.put(handle)  # others do not wait for a page that sends without pause
+    assert taken == [0, 1, 2]
