@@ -103,10 +103,12 @@ def test_files_are_relative_to_the_folder_of_the_user(tmp_path, monkeypatch):
         box.wait_until(log="hello")
 
 
-def test_what_cannot_be_sent_is_an_argument_error():
+def test_what_cannot_be_sent_or_done_is_an_error_of_the_caller():
     with ControlBox(pace="lockstep", port_base=None) as box:
         with pytest.raises(ArgumentError, match="allowed is JSON object"):
             box.at(99, "push", {"force": (x for x in (1, 2, 3))})
+        with pytest.raises(ControlError, match="the time has passed"):
+            box.at(0.0, "protective_stop")
         assert box.state.steady
 
 

@@ -122,7 +122,6 @@ CASES = {
     ("saveLog", "ok"): ([], "", "Log saved to disk"),
     ("saveLog", "failed"): ([no_place_for_the_log], "", "Failed to execute: saveLog"),
 }  # fmt: skip
-CHANGES = ("load", "quit", "shutdown", "power off", "restart safety")
 # What a UR5e answers, in this order, to commands that CB3 has not, or in another way: the line, the reply.
 E_SERIES_CASES = {
     "PolyscopeVersion": r"URSoftware 5\.15\.0\.126572 \(Oct 01 2023\)",
@@ -155,26 +154,30 @@ def test_every_reply_has_a_case():
     assert asked >= {row.name for row in COMMANDS if row.since.cb3 is None}
 
 
-# Those that leave the box as it was are asked one after the other.
-HARMLESS = [key for key, case in CASES.items() if not case[0] and key[0] not in CHANGES]
-OTHERS = [key for key in CASES if key not in HARMLESS]
+# A box of its own has what cuts power or connections, and what needs more than commands before it.
+CUTS = ("quit", "shutdown", "power on", "power off", "brake release", "restart safety")
+ALONE = [key for key, (before, *_) in CASES.items() if key[0] in CUTS or any(map(callable, before))]
+# The others are asked one after the other, first those before which nothing happens.
+TOGETHER = [key for key in CASES if key not in ALONE]
+TOGETHER.sort(key=lambda key: (len(CASES[key][0]), key[0] == "load"))
 
 
-def check_reply(dashboard, key):
-    _, argument, expected = CASES[key]
+def check_reply(box, dashboard, folder, key):
+    before, argument, expected = CASES[key]
+    for step in before:
+        step(box, dashboard, folder) if callable(step) else dashboard.ask(step)
     assert re.fullmatch(expected, dashboard.ask(f"{key[0]} {argument}".strip())), key
 
 
-def test_replies_that_change_nothing(dashboard):
-    for key in HARMLESS:
-        check_reply(dashboard, key)
+def test_replies_of_one_box(box, dashboard, folder):
+    for key in TOGETHER:
+        check_reply(box, dashboard, folder, key)
+        dashboard.ask("stop")
 
 
-@pytest.mark.parametrize("key", OTHERS, ids=" ".join)
-def test_reply(box, dashboard, folder, key):
-    for step in CASES[key][0]:
-        step(box, dashboard, folder) if callable(step) else dashboard.ask(step)
-    check_reply(dashboard, key)
+@pytest.mark.parametrize("key", ALONE, ids=" ".join)
+def test_reply_of_a_box_of_its_own(box, dashboard, folder, key):
+    check_reply(box, dashboard, folder, key)
 
 
 # --- what the commands do
@@ -497,7 +500,7 @@ def test_random_sessions_get_one_fitting_reply_a_line(folder):
 
 
 def test_shutdown_closes_all_ports_of_one_box():
-    with ControlBox.many(2, in_process=True, pace="lockstep", port_base=None) as (box, neighbour):
+    with ControlBox.many(2, pace="lockstep", port_base=None) as (box, neighbour):
         with Dashboard(box) as dashboard, connect(box, "realtime") as frames:
             assert not box.is_shut_down
             assert dashboard.ask("shutdown") == "Shutting down"
@@ -513,6 +516,7 @@ def test_shutdown_closes_all_ports_of_one_box():
         assert not neighbour.is_shut_down
 
 
+@pytest.mark.nightly
 def test_serve_ends_when_its_box_is_switched_off(tmp_path, folder):
     options = ["--port-base", "4000", "--programs", folder, "--host", "127.0.0.93"]
     command = [sys.executable, "-m", "ur_emulator", "serve", *options]

@@ -5,7 +5,7 @@ import re
 
 import pytest
 from dashboard_support import Dashboard, expression, external_control, script_line, urp
-from urp_samples import ANGLES, branch, direction, move, pin, until_distance, waypoint
+from urp_samples import ANGLES, assignment, branch, direction, move, pin, until_distance, waypoint
 from urp_support import lines_of, made
 
 from ur_emulator.emulator import ControlBox
@@ -79,6 +79,10 @@ UNDEFINED = [
     ('<Script type="Line"/>', "a <Script> node has no expression"),
     ('<Script type="File"><file>/programs/gone.script</file></Script>', r"the file of a <Script> node is missing: .*gone\.script"),
     (branch("If"), "the expression of a <If> node is empty"),
+    (branch("If", "", "True") + branch("ElseIf"), "the expression of a <If> node is empty"),
+    ("<Switch><expression/><children/></Switch>", "the expression of a <Switch> node is empty"),
+    (assignment("a", ""), "the expression of a <Assignment> node is empty"),
+    ('<Popup inputType="Variable"/>', "'' of a <Popup> node is not the name of a variable"),
     ('<Loop type="Counting"/>', "count of a <Loop> is '', a number"),
     (f'<Switch>{expression("1")}<children><Case/></children></Switch>', "value of a <Case> is '', a number"),
     ('<Timer action="Start"><variable/></Timer>', "'' of a <Timer> node is not the name of a variable"),

@@ -504,7 +504,9 @@ def test_the_raw_channel_has_the_payload_and_the_axes_of_the_flange():
     assert bench.now.actual_tcp_force[:3] == pytest.approx(5.0 * x_of_flange, abs=0.15)
 
 
-@pytest.mark.parametrize(("robot", "fidelity"), [("ur3e", "poor"), ("ur10e", "ideal")])
+@pytest.mark.parametrize(
+    ("robot", "fidelity"), [("ur3e", "poor"), pytest.param("ur10e", "ideal", marks=pytest.mark.nightly)]
+)
 def test_force_mode_holds_ten_newtons_on_the_table(robot, fidelity):
     """A real UR5e asked for 10 N held 8.95 to 13.26 N over its work space (doi 10.3390/s26051709)."""
     bench = bench_of(robot, fidelity, x=0.3 if robot == "ur3e" else 0.5, z=0.0)

@@ -94,7 +94,7 @@ def test_sockets_calls_and_modbus_units_of_a_program_are_explained(file):
         calls.register_function(lambda a, b: [a + b, 0.5, {"x": 1}["x"]], "add")
         calls.register_function(lambda name: f"hello {name}", "greet")
         threading.Thread(target=calls.serve_forever, daemon=True).start()
-        with socket.create_server(("127.0.0.1", 0)) as server, kept(file) as box:
+        with socket.create_server(("127.0.0.1", 0)) as server, kept(file, in_process=True) as box:
             unit = f"127.0.0.1:{box.ports.modbus}"
             lines = (
                 f'socket_open("127.0.0.1", {server.getsockname()[1]}, "s")',
@@ -213,6 +213,8 @@ def test_a_sensor_that_differs_in_one_bit_is_found(session):
 def test_a_journal_is_read_after_its_process_was_killed(file):
     box = kept(file).__enter__()
     box.wait_until(time=box.state.time + 0.2)
+    while file.read_text().count("\n") < 20:
+        pass
     box._rack._child.look()
     os.kill(box._rack._child.pid, signal.SIGKILL)
     with pytest.raises(EmulatorError, match="SIGKILL"):

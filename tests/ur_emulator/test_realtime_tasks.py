@@ -229,7 +229,10 @@ def test_a_process_that_cannot_be_started_is_reported_and_tried_again(bench, mon
     assert bench.ask(operator.add, 1, 2) == 3
 
 
-@pytest.mark.parametrize(("how", "stopped"), [(signal.SIGINT, ""), (signal.SIGKILL, "worker")])
+@pytest.mark.parametrize(
+    ("how", "stopped"),
+    [pytest.param(signal.SIGINT, "", marks=pytest.mark.nightly), (signal.SIGKILL, "worker")],
+)
 def test_the_process_ends_with_the_one_that_started_it(how, stopped):
     """So do the box and the server of both: they hold the pipe for errors open as long as they live."""
     code = (
@@ -264,6 +267,7 @@ def test_a_fork_leaves_the_process_to_its_parent(bench):
     assert bench.ask(os.getpid) == pid
 
 
+@pytest.mark.nightly
 def test_a_script_without_a_main_guard_is_not_run_again(tmp_path):
     script = tmp_path / "mine.py"
     script.write_text(

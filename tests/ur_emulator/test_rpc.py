@@ -70,11 +70,12 @@ def test_a_text_is_utf_8_in_a_program():
     assert bench.texts[-1] == "got \xc3\xa9"
 
 
-def test_a_result_without_counterpart_ends_the_program_and_its_connection():
+@pytest.mark.parametrize("result", [object(), [[1], [1, 2]]])
+def test_a_result_without_counterpart_ends_the_program_and_its_connection(result):
     bench = RpcBench()
     bench.call()
-    bench.answer(object())
-    assert any("the result" in text for text in bench.texts)
+    bench.answer(result)
+    assert any("the result" in text or "rows of equal length" in text for text in bench.texts)
     assert not bench.controller.programs.is_running
     assert bench.network.closed == [bench.network.calls[0][1]]
 
