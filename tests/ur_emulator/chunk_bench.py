@@ -131,7 +131,9 @@ class ChunkRun:
         if 0 <= cycle <= self._last_look:
             for name, values in self.seen.items():
                 true = _TRUE.get(name)
-                values[cycle] = np.array(true(self.bench.controller) if true else getattr(self.bench.now, name))
+                values[cycle] = np.array(
+                    true(self.bench.controller) if true else getattr(self.bench.now, name)
+                )
         for event in self.bench.events[first:]:
             self._take(cycle, event)
 
