@@ -37,11 +37,6 @@ def test_forward_kinematics_is_the_product_of_dh_matrices(arm, tcp):
         assert pose_to_T(arm.fk(q, tcp)) == pytest.approx(expected, abs=1e-12)
 
 
-def test_home_is_the_middle_of_the_work_box():
-    x, y, z, *_ = ArmModel(UR3).fk(UR3.home_q)
-    assert (x, y, z) == pytest.approx((0.35, 0.0, 0.25), abs=1e-3)
-
-
 @pytest.mark.parametrize("tcp", [None, TCP])
 def test_jacobian_is_the_derivative_of_forward_kinematics(arm, tcp):
     h = 1e-6

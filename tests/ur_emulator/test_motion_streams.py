@@ -12,7 +12,7 @@ from motion_support import ARM, DT, HOME, START, TOOL, tool_accelerations, tool_
 from protocol.pose import pose_sub
 from ur_emulator.machine.models.robot_model import ZERO6
 from ur_emulator.machine.motion.arm_motion import ArmMotion
-from ur_emulator.machine.motion.generators import LOST_DECELERATION, JointTarget, ServoJ, SpeedJ, StopJ
+from ur_emulator.machine.motion.generators import JointTarget, ServoJ, SpeedJ, StopJ
 from ur_emulator.machine.motion.leg import move_j
 from ur_emulator.machine.motion.move import Move
 from ur_emulator.machine.motion.tool import Tool
@@ -92,7 +92,7 @@ def test_a_servoj_that_is_not_renewed_stops():
         motion.step(DT, 1.0)
     before = motion.target.qd[0]
     motion.step(DT, 1.0)
-    assert before - motion.target.qd[0] == pytest.approx(LOST_DECELERATION * DT)
+    assert before - motion.target.qd[0] == pytest.approx(20.0 * DT)
 
 
 @given(twists, st.floats(0.2, 2.0), st.floats(0.2, 3.0))
