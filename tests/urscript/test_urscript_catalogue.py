@@ -17,6 +17,7 @@ from urscript.catalogue import ALL_ROWS, CB3_3_15, Builtin, Generation, TimeClas
 from urscript.catalogue.calls import compile_fitting, fits, static_bind
 from urscript.catalogue.catalogue import read_rows
 from urscript.catalogue.types import REQUIRED, ParamType, Support, Version
+from urscript.check.checking import check_program
 from urscript.errors import ScriptRuntimeError, ScriptTypeError
 
 VERSIONS = (
@@ -175,6 +176,11 @@ def test_versions():
 )
 def test_suggestions(misspelt, meant):
     assert CB3_3_15.suggest(misspelt, ["my_function"]) == meant
+
+
+def test_so_many_names_of_a_program_get_a_suggestion():
+    errors, _ = check_program("\n".join(f"movej{n}()" for n in range(42)))
+    assert [error.hint for error in errors] == 40 * ["did you mean 'movej'?"] + [None, None]
 
 
 def test_a_catalogue_of_the_tables_is_pickled_by_its_version_and_any_other_whole():

@@ -34,7 +34,11 @@ WRONG = list(cases("wrong_programs.script"))
 
 
 def told(text):
-    return [as_utf8(error.headline()).removeprefix("a:") for error in check_with_advice(text, name="a")[0]]
+    """Place and words of each error, and its carets."""
+    errors, _ = check_with_advice(text, name="a")
+    return [
+        as_utf8(f"{error.headline()} {error.render().split()[-1]}").removeprefix("a:") for error in errors
+    ]
 
 
 @pytest.mark.parametrize(("name", "text", "said"), WRONG, ids=[name for name, *_ in WRONG])
@@ -210,7 +214,13 @@ def test_json_of_fmt_says_what_would_change(call):
 
 
 @pytest.mark.parametrize(
-    "words", [("check",), ("run",), *((it, "nowhere.script") for it in ("check", "run", "fmt"))]
+    "words",
+    [
+        ("check",),
+        ("run",),
+        ("check", "--software", "9.9", "-"),
+        *((it, "nowhere.script") for it in ("check", "run", "fmt")),
+    ],
 )
 def test_wrong_use_exits_with_2(call, words):
     assert call(*words).exit_code == 2

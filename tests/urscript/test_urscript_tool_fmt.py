@@ -148,11 +148,11 @@ def call(*words, **more):
 
 
 def test_fmt_goes_on_after_a_program_with_errors_and_leaves_it_alone(folder):
-    result = call("wrong.script", "ugly.script")
+    result = call("wrong.script", "ugly.script", "pretty.script")
     assert (result.exit_code, result.stdout) == (1, "")
     assert "wrong.script:1:7: Syntax error" in result.stderr
     assert Path("wrong.script").read_bytes() == b"def f(:\n"
-    assert Path("ugly.script").read_bytes() == PRETTY.encode()
+    assert Path("ugly.script").read_bytes() == Path("pretty.script").read_bytes() == PRETTY.encode()
 
 
 def test_fmt_reads_and_writes_the_standard_streams():
@@ -174,5 +174,6 @@ def test_check_and_diff_write_nothing(folder):
 @given(programs, statements)
 def test_same_tree_is_equality(tree, other):
     assert same_tree(tree, parse(Source(print_program(tree))))
+    assert not same_tree(tree, (*tree, other))
     for changed in ((*tree, other), (*tree[:-1], other), (other, *tree[1:])):
         assert same_tree(tree, changed) == (tree == changed)

@@ -229,6 +229,7 @@ def _tracing(program: CompiledProgram, cycle: Callable[[], int], limit: int) -> 
         if n_shown == limit:
             show(f"trace stops after {limit} lines (--trace-lines)", error=True)
             sys.settrace(earlier)
+            frame.f_trace = None
             return None
         n_shown += 1
         text = program.source.line(frame.f_lineno).strip()
