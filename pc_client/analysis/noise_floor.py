@@ -5,10 +5,11 @@ positions; the noise n of that difference at rest, seen through the Jacobian J a
 
     P_floor = mean over the steps of E[ (|v_ref + n| - |v_ref|)^2 ],     n ~ N(0, J C J' / dt^2)
 
-C (6, 6) is the covariance of the one-cycle differences of `actual_q` while the arm rests before and after its
-movements: of the differences, so that whatever colour the noise has is in it. While the arm is fast only the
-noise along the motion counts, near rest all of it does; the expectation takes care of both. Nothing is fitted
-to the movement, and nothing is known of the arm but what it reports.
+C (6, 6) is the covariance of the differences of `actual_q` over a step while the arm rests before and after
+its movements: of the differences, so that whatever colour the noise has is in it. While the arm is fast only
+the noise along the motion counts, near rest all of it does; the expectation takes care of both. Nothing is
+fitted to the movement, and nothing is known of the arm but what it reports. The noise of the error budget is
+the same.
 
 What moves with the arm and does not repeat (the moment of sampling, for one) is not in C. It can be measured
 together with the encoders' noise, from two runs as if driven alike: `unrepeatable_power`, half the mean
@@ -16,14 +17,16 @@ square of their difference. What noise adds to the mean of the speed near rest i
 drops out there: of a movement with long slow tails this figure is better than the floor, else a little worse.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from contextlib import suppress
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pc_client.analysis.measures import decibels, rest_samples, speed, speed_noise, velocity
-from pc_client.analysis.run import MeasuredRun
+from pc_client.analysis.measures import decibels, rest_samples, speed, steps_of, velocity
 from pc_client.arrays import Array
 from pc_client.control.loop import LoopModel, velocity_response
 from pc_client.errors import CellError
@@ -32,17 +35,25 @@ from pc_client.kinematics.arms import ROBOTS
 from pc_client.kinematics.model import RobotModel, robot_model, tcp_jacobian
 from ur_hil.cell import NO_CELL, parse_cell
 
-LEAST_STEPS = 30
-"""Differences at rest from which C is worth estimating: its diagonal is good to 25 % then."""
+if TYPE_CHECKING:
+    from pc_client.analysis.run import MeasuredRun
+
+_NODES = 5
+"""Nodes of the Gauss-Hermite rule an axis: exact for polynomials up to the ninth degree."""
+
+LEAST_STEPS = 25
+"""Differences at rest from which C is worth estimating: its diagonal is good to 30 %, the floor to .5 dB.
+One run on a CB3 has 29."""
 
 
 def step_covariance(runs: Sequence[MeasuredRun]) -> Array | None:
     """Return C (6, 6) [rad2] of all runs of one arm together; None with fewer than `LEAST_STEPS` steps."""
-    stretches = [
-        np.diff(run.recording.column("actual_q")[run.track.rows[samples]], axis=0)
-        for run in runs
-        for samples in rest_samples(run.recording, run.track)
-    ]
+    stretches = []
+    for run in runs:
+        for samples in rest_samples(run.recording, run.track):
+            q = run.recording.column("actual_q")[run.track.rows[samples]]
+            begins, ends = steps_of(run.track.t[samples])
+            stretches.append(q[ends] - q[begins])
     if sum(map(len, stretches)) < LEAST_STEPS:
         return None
     steps = np.concatenate([stretch - stretch.mean(axis=0) for stretch in stretches])
@@ -52,22 +63,47 @@ def step_covariance(runs: Sequence[MeasuredRun]) -> Array | None:
     return covariance
 
 
-def floor_db(run: MeasuredRun, covariance: Array | None) -> float | None:
-    """Return the SNR [dB] at which noise alone would leave a run; None for an unknown arm or without rest.
+def noise_power(run: MeasuredRun, covariance: Array | None) -> tuple[float, float] | None:
+    """Return what noise adds to the power of the speed error of a run by its mean and its variance [(m/s)2].
 
-    The noise is seen through the reference and the time stamps; C is (6, 6) [rad2]. The Jacobian of the
-    nominal arm is good to the calibration, 1 %.
+    None for an unknown arm or without rest. The noise is seen through the reference and the time stamps; C is
+    (6, 6) [rad2]. The Jacobian of the nominal arm is good to the calibration, 1 %.
     """
     model = _nominal(run)
     if covariance is None or model is None:
         return None
-    track, steps = run.track, run.track.movement_steps
-    dt = np.diff(track.t)[steps]
-    jacobians = _jacobians(run, model)[steps]
+    track, inside = run.track, run.track.movement_steps
+    begins, ends = (samples[inside] for samples in steps_of(track.t))
+    dt, jacobians = track.t[ends] - track.t[begins], _jacobians(run, model)[begins]
     noise = jacobians @ covariance @ jacobians.transpose(0, 2, 1) / np.square(dt)[:, None, None]
-    mean, variance = speed_noise(velocity(track.t, track.p_ref)[steps], noise)
-    power, signal = float(np.mean(np.square(mean) + variance)), run.budget.signal_power
+    mean, variance = speed_noise(velocity(track.t, track.p_ref)[inside], noise)
+    return float(np.mean(np.square(mean))), float(np.mean(variance))
+
+
+def floor_db(run: MeasuredRun) -> float | None:
+    """Return the SNR [dB] at which noise alone would leave a run; None where the noise is not known."""
+    power, signal = sum(run.noise), run.budget.signal_power
     return decibels(signal, power) if power > 0.0 < signal else None
+
+
+def speed_noise(v: Array, covariance: Array) -> tuple[Array, Array]:
+    """Mean (n,) [m/s] and variance (n,) [(m/s)2] of |v + n| - |v|, n being normal with mean zero.
+
+    The velocities are (n, 3) [m/s], the covariance of n is (n, 3, 3) or (3, 3) [(m/s)2]. By Gauss-Hermite
+    quadrature.
+    """
+    nodes, weights = np.polynomial.hermite_e.hermegauss(_NODES)
+    grid = np.stack(np.meshgrid(nodes, nodes, nodes, indexing="ij"), axis=-1).reshape(-1, 3)
+    share = np.einsum("i,j,k->ijk", weights, weights, weights).ravel()
+    share /= share.sum()
+    # A root of each covariance; a tiny negative eigenvalue is rounding.
+    values, vectors = np.linalg.eigh(np.broadcast_to(covariance, (len(v), 3, 3)))
+    roots = vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :]
+    noisy = np.linalg.norm(v[:, None, :] + grid @ roots.transpose(0, 2, 1), axis=2)
+    excess = noisy - np.linalg.norm(v, axis=1)[:, None]
+    mean: Array = excess @ share
+    variance: Array = np.square(excess) @ share - np.square(mean)
+    return mean, np.maximum(variance, 0.0)
 
 
 def unrepeatable_power(runs: Sequence[MeasuredRun]) -> float | None:

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pc_client.analysis import measures
+from pc_client.analysis.noise_floor import noise_power, step_covariance
 from pc_client.arrays import Array
 from pc_client.driver.velocity_stream import StreamReport
 from pc_client.errors import RecordingError
@@ -70,9 +71,8 @@ class Signals:
 
         The rows of the first 8 ms are 0.
         """
-        t, p, each = self.t, self.tcp_pose[:, :3], measures.rows_per_sample(self.t)
-        moved = np.linalg.norm(p[each:] - p[:-each], axis=1) / (t[each:] - t[:-each])
-        return np.concatenate((np.zeros(min(each, len(t))), moved))
+        moved = measures.speed(self.t, self.tcp_pose[:, :3])
+        return np.concatenate((np.zeros(len(self.t) - len(moved)), moved))
 
     def columns(self) -> Mapping[str, Array]:
         """Every number as a column (n,) of its own, by name; RTDE names where RTDE has the signal."""
@@ -119,7 +119,7 @@ class Run(Signals):
         recording = load_recording(path)
         track = measures.track_of(recording)
         t, q, qd, pose, command = (
-            recording.column(name)[track.new_rows]
+            recording.column(name)[track.rows]
             for name in ("timestamp", "actual_q", "actual_qd", "actual_TCP_pose", "cmd_qd")
         )
         whose, summary = recording.provenance, recording.summary
@@ -172,16 +172,16 @@ class Run(Signals):
     @property
     def ref_q(self) -> Array:
         """(n, 6) joint positions of the reference [rad]."""
-        return self.recording.column("ref_q")[self._track.new_rows]
+        return self.recording.column("ref_q")[self._track.rows]
 
     @property
     def ref_tcp_position(self) -> Array:
         """(n, 3) TCP position of the reference [m]."""
-        return self.recording.column("ref_tcp_position")[self._track.new_rows]
+        return self.recording.column("ref_tcp_position")[self._track.rows]
 
     def columns(self) -> Mapping[str, Array]:
         """Every number of the recording as a column (n,) of its own, with `t` and `tcp_speed`."""
-        rows = self._track.new_rows
+        rows = self._track.rows
         recorded = {name: values[rows] for name, values in flat_columns(self.recording).items()}
         return {"t": self.t, "tcp_speed": self.tcp_speed, **recorded}
 
@@ -207,15 +207,31 @@ class Run(Signals):
         return open_window(*(run.recording.path for run in (self, *others)))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, eq=False)
 class MeasuredRun:
-    """One recording and what was measured on it."""
+    """One recording and what was measured on it.
+
+    Attributes:
+        covariance: of the encoders' noise, (6, 6) [rad2], as all runs of the experiment show it at rest;
+            None: as this one does.
+    """
 
     recording: Recording
     track: measures.TcpTrack
     snr: measures.Snr
     errors: measures.Errors
-    budget: measures.Budget
+    covariance: Array | None = None
+
+    @cached_property
+    def noise(self) -> tuple[float, float]:
+        """What noise adds to the power of the speed error by its mean and its variance; 0 if not known."""
+        covariance = step_covariance([self]) if self.covariance is None else self.covariance
+        return noise_power(self, covariance) or (0.0, 0.0)
+
+    @cached_property
+    def budget(self) -> measures.Budget:
+        """The power of the speed error by its parts."""
+        return measures.error_budget(self.track, self.snr.speed_lag_s, self.noise)
 
     @property
     def provenance(self) -> Provenance:
@@ -270,7 +286,6 @@ def analyse_run(recording: Recording, *, include_aborted: bool = False) -> Measu
         track=track,
         snr=snr,
         errors=measures.measure_errors(recording, track, snr.velocity_lag_s),
-        budget=measures.error_budget(recording, track, snr.speed_lag_s),
     )
 
 
@@ -429,11 +444,13 @@ def _joint_curves(t: Array, values: Array) -> list[Curve]:
 
 
 def _speed(run: MeasuredRun, *, desired: bool = False) -> Array:
-    """TCP speed at each first difference [m/s]."""
+    """TCP speed at each step [m/s]."""
     return measures.speed(run.track.t, run.track.p_ref if desired else run.track.p_actual)
 
 
 def _step_times(run: MeasuredRun) -> Array:
-    """The middle of each first difference, s since the movement began."""
+    """The middle of each step, s since the movement began."""
     t = run.track.t
-    return 0.5 * (t[1:] + t[:-1]) - run.track.t_start
+    begins, ends = measures.steps_of(t)
+    middle: Array = 0.5 * (t[begins] + t[ends]) - run.track.t_start
+    return middle
