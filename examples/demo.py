@@ -2,8 +2,9 @@
 
 Starts a box in lockstep pace as a process of its own, lets the client run the ten movements three times each
 with the published controller and with `preview`, once each with other numbers of the published one, and once
-each with both in .7 of the time; ends the box. The client is the same that drives a real arm; only the address differs. Results in out/demo:
-report.html, and a folder with tables and recordings for each controller.
+each with both in .7 of the time; ends the box. The client is the same that drives a real arm; only the
+address differs. Results in out/demo: report.html, and a folder with tables and recordings for each
+controller.
 """
 
 from __future__ import annotations

@@ -36,8 +36,8 @@ class Groups:
     Attributes:
         figure: its name.
         frame: a row for each group: the mean over its n units, their standard deviation (`spread`), and the
-            ends of the mean's 95 % interval (`low`, `high`). Then one for each pair of groups, less the second
-            (`minus`): the same of the n paired differences, and `p`. Null where units are too few.
+            ends of the mean's 95 % interval (`low`, `high`). Then one for each pair of groups, less the
+            second (`minus`): the same of the n paired differences, and `p`. Null where units are too few.
     """
 
     figure: str

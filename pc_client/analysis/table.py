@@ -338,8 +338,9 @@ class SideBySide:
 
     @property
     def differences(self) -> list[dict[str, Any]]:
-        """Paired differences of the SNR, as `compare` gives them: of the kinds in each experiment (`of`), and of
-        the experiments for each kind.
+        """Paired differences of the SNR, as rows of `compare`: of the kinds, and of the experiments.
+
+        `of` says in which experiment, or for which kind.
         """
 
         def runs(kind: str, table: Table) -> list[MeasuredRun]:
@@ -371,13 +372,14 @@ class SideBySide:
     def offsets(self) -> list[str]:
         """What the largest position error of each experiment is made of, a sentence each."""
         worst = [
-            max(table.all_runs, key=lambda run: run.errors.max_position_error_mm) for table in self.columns
+            max((run.errors for run in table.all_runs), key=lambda e: e.max_position_error_mm)
+            for table in self.columns
         ]
         return [
-            f"{label}: {e.max_position_error_mm:.1f} mm, there the constant offset between the client's nominal "
-            f"arm and the robot's calibrated one is {math.hypot(*e.offset_mm):.1f} mm; without it and the lag "
-            f"{e.max_path_error_mm:.1f} mm are left."
-            for label, e in zip(self.labels, (run.errors for run in worst), strict=True)
+            f"{label}: {e.max_position_error_mm:.1f} mm, there the constant offset between the client's "
+            f"nominal arm and the robot's calibrated one is {math.hypot(*e.offset_mm):.1f} mm; without it and "
+            f"the lag {e.max_path_error_mm:.1f} mm are left."
+            for label, e in zip(self.labels, worst, strict=True)
         ]
 
     @property
