@@ -2,7 +2,7 @@
 
 Starts a box in lockstep pace as a process of its own, lets the client run the ten movements three times each
 with the published controller and with `preview`, once each with other numbers of the published one, and once
-each with both in .7 of the time; ends the box. The client is the same that drives a real arm; only the
+each with both in .8 of the time; ends the box. The client is the same that drives a real arm; only the
 address differs. Results in out/demo: report.html, and a folder with tables and recordings for each
 controller.
 """
@@ -26,8 +26,9 @@ PAPER, PREVIEW = ur.Controller.paper(), ur.Controller.preview()
 # The paper gives neither gains nor acceleration: the page shows what other ordinary numbers would have given.
 # P [1/s], I [1/s2] and the acceleration of `speedj` [rad/s2].
 OTHER_NUMBERS = ((2.0, 0.5, 3.0), (10.0, 5.0, 3.0), (4.0, 2.0, 5.0), (4.0, 2.0, 20.0))
-FASTER = 0.7
-"""Of the duration of each movement: pace weighs more than any of these numbers."""
+FASTER = 0.8
+"""Of the duration of each movement: pace weighs more than any of these numbers. At .7 the client refuses two
+movements with the published controller, which would leave their paths too far."""
 
 
 def main() -> int:
