@@ -12,8 +12,10 @@ from matplotlib.mathtext import MathTextParser
 
 DOCS = Path(__file__).parents[1] / "docs"
 PAGES = ("theory.md", "extraction.md", "tracking.md", "movements.md", "drawing.md")
-_GREEK = "alpha beta gamma kappa Lambda mu phi Phi sigma tau theta zeta".split()
-_NO_FORMULA = re.compile(r"--|\.(py|toml|mcap|csv|md|json)\b|\"|`|[a-z]/[a-z]|^\w+$|[a-z]_[a-z]+\(|^[\w./ -]+$")
+_GREEK = ["alpha", "beta", "gamma", "kappa", "Lambda", "mu", "phi", "Phi", "sigma", "tau", "theta", "zeta"]
+_NO_FORMULA = re.compile(
+    r"--|\.(py|toml|mcap|csv|md|json)\b|\"|`|[a-z]/[a-z]|^\w+$|[a-z]_[a-z]+\(|^[\w./ -]+$"
+)
 
 
 class _Parts(HTMLParser):

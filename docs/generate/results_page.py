@@ -30,6 +30,7 @@ def render() -> str:
         differences=_differences(run),
         changes=_changes(run),
         own=published[0],
+        preview=next(row for row in run["rows"] if row["controller"] == "preview"),
         fast=next(row for row in published if row["duration"] != 1.0),
     )
 
@@ -39,14 +40,14 @@ def _differences(run: dict[str, Any]) -> str:
         [
             row["of"],
             f"{row['group']} less {row['minus']}",
-            f"{row['mean']:.1f}",
+            f"{round(row['mean'], 1) + 0.0:.1f}",
             f"{row['low']:.1f} to {row['high']:.1f}",
             f"{row['n']}",
             bare(row["p"], 3),
         ]
         for row in run["differences"]
     ]
-    return table(["in, for", "SNR of", "mean [dB]", "95 % [dB]", "pairs", "p"], rows)
+    return table(["in, for", "SNR of", "mean [dB]", "95 % [dB]", "pairs", "p"], rows, n_right=4)
 
 
 def _changes(run: dict[str, Any]) -> str:
@@ -56,7 +57,7 @@ def _changes(run: dict[str, Any]) -> str:
         + [f"{row[figure][kind]:.1f}" for figure in ("snr_db", "floor_db") for kind in KINDS]
         for row in run["rows"]
     ]
-    return table([*heads, *(f"floor, {kind} [dB]" for kind in KINDS)], rows)
+    return table([*heads, *(f"floor, {kind} [dB]" for kind in KINDS)], rows, n_right=5)
 
 
 def collected(folder: Path) -> dict[str, Any]:
