@@ -13,7 +13,7 @@ from pc_client.movements.library_sets import library_names
 from pc_client.movements.lognormal import LiteralTiming
 from pc_client.movements.movement import load_movement
 from pc_client.movements.recipes import HAND_STROKE
-from pc_client.movements.sigma_lognormal import LEAD
+from pc_client.movements.sigma_lognormal import LEAD, SigmaLognormal
 from pc_client.planning.plan import plan_movement
 
 _DELAYS = (0.020, 0.028)
@@ -115,6 +115,7 @@ def _hand() -> dict[str, tuple[float, float]]:
     found: dict[str, list[float]] = {"mu": [], "strokes": [], "gaps": []}
     for name in library_names("paper")[5:]:
         movement = load_movement(name)
+        assert isinstance(movement.trajectory, SigmaLognormal)
         stretch = float(movement.provenance["time_stretch"])
         found["mu"] += [stroke["mu"] - math.log(stretch) for stroke in describe(movement)["strokes"]]
         found["strokes"] += (movement.stroke_durations / stretch).tolist()

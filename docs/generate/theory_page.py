@@ -139,13 +139,14 @@ def _trapezoid(up: float, down: float) -> NDArray[np.float64]:
 def _two_boxcars() -> NDArray[np.float64]:
     """A square of .8 s and two boxcars of .1 s, sampled with both ends."""
     boxcar = np.ones(101) / 101
-    wave = np.convolve(np.convolve(np.ones(801), boxcar), boxcar)
+    wave: NDArray[np.float64] = np.convolve(np.convolve(np.ones(801), boxcar), boxcar)
     return wave / (wave.sum() / 1000.0)
 
 
 def _profiles() -> str:
     def lognormal(timing: LiteralTiming | TwoSidedTiming) -> NDArray[np.float64]:
-        return timing.lognormal.evaluate(_STROKE).rate
+        rate: NDArray[np.float64] = timing.lognormal.evaluate(_STROKE).rate
+        return rate
 
     profiles = {
         "minimum jerk": (stroke_shape(_STROKE).rate, (4, 4, 3)),

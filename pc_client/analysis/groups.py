@@ -16,7 +16,7 @@ from pc_client.errors import ClientError
 from pc_client.recording.recording import load_recording
 from pc_client.results.tables import Column, cells, frame_of, to_csv
 
-RunLike: TypeAlias = Run | MeasuredRun | Path | str
+_RunLike: TypeAlias = Run | MeasuredRun | Path | str
 """A run, the file of one, or a folder of files."""
 
 _COLUMNS = (
@@ -61,7 +61,7 @@ class Groups:
 
 
 def compare(
-    runs: Mapping[str, RunLike | Sequence[RunLike]] | Sequence[RunLike], figure: str = "snr_db"
+    runs: Mapping[str, _RunLike | Sequence[_RunLike]] | Sequence[_RunLike], figure: str = "snr_db"
 ) -> Groups:
     """Compare groups of runs by a figure: mean, spread, interval, and paired differences.
 
@@ -92,8 +92,8 @@ def compare(
     return Groups(figure, frame_of(rows, _COLUMNS).with_columns(pl.col(pl.Float64).fill_nan(None)))
 
 
-def _measured(given: RunLike | Sequence[RunLike]) -> Iterator[MeasuredRun]:
-    for one in [given] if isinstance(given, RunLike) else given:
+def _measured(given: _RunLike | Sequence[_RunLike]) -> Iterator[MeasuredRun]:
+    for one in [given] if isinstance(given, _RunLike) else given:
         if isinstance(one, Run | MeasuredRun):
             yield one.measured if isinstance(one, Run) else one
         else:
@@ -103,9 +103,10 @@ def _measured(given: RunLike | Sequence[RunLike]) -> Iterator[MeasuredRun]:
 
 
 def _by_what_differs(runs: Sequence[MeasuredRun]) -> dict[str, list[MeasuredRun]]:
-    all_facts = [(p.controller, p.kind, p.robot) for p in (run.provenance for run in runs)]
+    owners = [run.provenance for run in runs]
+    all_facts = [(p.controller, p.kind, p.robot) for p in owners]
     if len(set(all_facts)) == 1:
-        all_facts = [(run.provenance.serial,) for run in runs]
+        all_facts = [(p.controller, p.kind, p.serial) for p in owners]
     differ = [len(set(column)) > 1 for column in zip(*all_facts, strict=True)]
     groups: dict[str, list[MeasuredRun]] = {}
     for run, facts in zip(runs, all_facts, strict=True):

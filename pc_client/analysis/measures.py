@@ -126,7 +126,7 @@ def track_of(recording: Recording) -> TcpTrack:
     with np.errstate(invalid="ignore"):  # endless times are refused below
         rows = np.flatnonzero(np.diff(t, prepend=-np.inf) > 0.0)
     moving = np.flatnonzero(recording.rows_of(Phase.MOVEMENT)[rows])
-    least = _MIN_MOVEMENT_STEPS * rows_per_step(t[rows])
+    least = _MIN_MOVEMENT_STEPS * _rows_per_step(t[rows])
     if len(moving) < least:
         raise RecordingError(
             f"{recording.path} has {len(moving)} samples of movement; at least {least} are needed"
@@ -156,7 +156,7 @@ def _cycle(t: Array) -> float:
     return float(np.median(np.diff(t))) if len(t) > 1 else SAMPLING_TIME
 
 
-def rows_per_step(t: Array) -> int:
+def _rows_per_step(t: Array) -> int:
     """How many samples at times (n,) [s] make 8 ms: 1 at 125 Hz, 4 at 500 Hz."""
     return max(round(SAMPLING_TIME / _cycle(t)), 1)
 
@@ -166,7 +166,7 @@ def steps_of(t: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
 
     Where that frame is lost the step begins at the last one before, and is longer; no other is moved by it.
     """
-    each = rows_per_step(t)
+    each = _rows_per_step(t)
     ends = np.arange(each, len(t))
     begins = np.searchsorted(t, t[ends] - (each - 0.5) * _cycle(t)) - 1
     return np.maximum(begins, 0), ends
@@ -289,7 +289,7 @@ def _shifted_pair(track: TcpTrack, lag_s: float, velocity_of: _VelocityOf) -> tu
     half_cycle = 0.5 * _cycle(track.t)
     shifted_t = track.t - lag_s
     inside = np.flatnonzero((shifted_t > track.t_start - half_cycle) & (shifted_t < track.t_end + half_cycle))
-    least = _MIN_MOVEMENT_STEPS * rows_per_step(track.t)
+    least = _MIN_MOVEMENT_STEPS * _rows_per_step(track.t)
     if len(inside) < least:
         raise RecordingError(
             f"{len(inside)} samples of movement are left after the best shift of {lag_s:.3f} s; "

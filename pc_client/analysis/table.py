@@ -377,8 +377,8 @@ class SideBySide:
         ]
         return [
             f"{label}: {e.max_position_error_mm:.1f} mm, there the constant offset between the client's "
-            f"nominal arm and the robot's calibrated one is {math.hypot(*e.offset_mm):.1f} mm; without it and "
-            f"the lag {e.max_path_error_mm:.1f} mm are left."
+            f"nominal arm and the robot's calibrated one is {math.hypot(*e.offset_mm):.1f} mm; without it "
+            f"and the lag {e.max_path_error_mm:.1f} mm are left."
             for label, e in zip(self.labels, worst, strict=True)
         ]
 
