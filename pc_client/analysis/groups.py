@@ -19,12 +19,14 @@ from pc_client.results.tables import Column, cells, frame_of, to_csv
 _RunLike: TypeAlias = Run | MeasuredRun | Path | str
 """A run, the file of one, or a folder of files."""
 
-_COLUMNS = (
+COLUMNS = (
     *(Column(name, align="left", kind=str) for name in ("group", "minus", "unit")),
     Column("n", kind=int),
-    *(Column(name, format=".2f") for name in ("mean", "spread", "low", "high")),
-    Column("p", format=".2g"),
+    *(Column(name, format=".2f", missing="–") for name in ("mean", "spread", "low", "high")),
+    Column("p", format=".2g", missing="–"),
 )
+"""Of the frame of `Groups`."""
+
 _UNITS = ("movement", "target points", "arm")
 """What a unit may be; of equally many the first counts."""
 
@@ -52,10 +54,10 @@ class Groups:
 
     def to_latex(self) -> str:
         """A tabular with the rules of the package booktabs, rounded."""
-        lines = [[column.name for column in _COLUMNS], *cells(self.frame, _COLUMNS)]
+        lines = [[column.name for column in COLUMNS], *cells(self.frame, COLUMNS)]
         escapes = str.maketrans({"\\": r"\textbackslash{}"} | {sign: f"\\{sign}" for sign in "&%$#_{}"})
         head, *rows = [" & ".join(cell.translate(escapes) for cell in line) + r" \\" for line in lines]
-        align = "".join(column.align[0] for column in _COLUMNS)
+        align = "".join(column.align[0] for column in COLUMNS)
         body = [r"\toprule", head, r"\midrule", *rows, r"\bottomrule"]
         return "\n".join([rf"\begin{{tabular}}{{{align}}}", *body, r"\end{tabular}", ""])
 
@@ -89,7 +91,7 @@ def compare(
     units = {label: _units_of(group, figure) for label, group in groups.items()}
     rows = [_of_group(*one) for one in units.items()]
     rows += [_of_pair(*one, *other) for one, other in combinations(units.items(), 2)]
-    return Groups(figure, frame_of(rows, _COLUMNS).with_columns(pl.col(pl.Float64).fill_nan(None)))
+    return Groups(figure, frame_of(rows, COLUMNS).with_columns(pl.col(pl.Float64).fill_nan(None)))
 
 
 def _measured(given: _RunLike | Sequence[_RunLike]) -> Iterator[MeasuredRun]:

@@ -16,6 +16,7 @@ import polars.selectors as cs
 from rich.console import Console
 from rich.progress import track as progress
 
+from pc_client.analysis.groups import COLUMNS
 from pc_client.analysis.measures import PARTS, SPLIT_HZ
 from pc_client.analysis.noise_floor import LEAST_STEPS
 from pc_client.analysis.run import MeasuredRun, analyse_run, budget_column, movement_sheet
@@ -59,16 +60,7 @@ _BUDGET = (
     *(Column(f"{budget_column(part)}_alone_db", part, format=".1f", missing="–") for part in PARTS),
     replace(_LEVEL, header="all", unit=""),
 )
-_DIFFERENCES = (
-    Column("of", "in, for", align="left", kind=str),
-    Column("group", "SNR of", align="left", kind=str),
-    Column("minus", "less that of", align="left", kind=str),
-    Column("mean", "mean difference", "dB", ".2f"),
-    Column("low", "95 % from", "dB", ".2f", missing="–"),
-    Column("high", "to", "dB", ".2f", missing="–"),
-    Column("n", "pairs", kind=int),
-    Column("p", format=".2g", missing="–"),
-)
+_DIFFERENCES = (Column("of", "in, for", align="left", kind=str), *COLUMNS)
 _PATH_ERROR = Column("max_path_error_mm", "path error", "mm", ".2f")
 
 
@@ -291,7 +283,11 @@ def build_side_by_side(reports: Sequence[Report], out: Path) -> SideBySide:
         shown=shown,
         n_movements=len(shown.frame),
         cards=[(level.header, mean_by_kind(shown.frame, level.name)) for level in levels],
-        links=[_link(table, folder[id(table)], out) for table in shown.columns],
+        links=[
+            (Path(os.path.relpath(page, out.parent)).as_posix(), label)
+            for label, table in experiments
+            if (page := folder[id(table)] / REPORT_HTML).exists()
+        ],
         labels=shown.labels,
         levels=to_html(rows, [name, *levels, Column("n_targets", "targets"), *others], bold="is_mean"),
         differences=to_html(frame_of(shown.differences, _DIFFERENCES), _DIFFERENCES),
@@ -315,12 +311,6 @@ def build_side_by_side(reports: Sequence[Report], out: Path) -> SideBySide:
     )
     write_files(out.parent, {out.name: text})
     return shown
-
-
-def _link(table: Table, folder: Path, out: Path) -> tuple[str, str] | None:
-    """The page of one experiment and its label; None where it has no page."""
-    page = folder / REPORT_HTML
-    return (Path(os.path.relpath(page, out.parent)).as_posix(), table.label) if page.exists() else None
 
 
 def _settings(tables: Sequence[Table]) -> str:

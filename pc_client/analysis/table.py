@@ -304,8 +304,7 @@ class SideBySide:
         columns = [MOVEMENT]
         if self.has_paper_rows:
             columns.append(replace(PAPER, header="paper, real UR3", unit="dB", narrow="paper,\nreal UR3"))
-        for i, table in enumerate(self.columns):
-            label = table.label
+        for i, label in enumerate(self.labels):
             narrow = label.removesuffix(" controller")
             level, *others = (replace(figure, name=f"{figure.name}_{i}") for figure in SHOWN)
             columns += [replace(level, header=label, unit="dB", narrow=narrow), *others]

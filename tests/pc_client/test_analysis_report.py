@@ -397,7 +397,7 @@ def test_the_papers_finding_is_set_beside_ours_with_pairs_and_interval(tmp_path:
         )
     text = own_text((tmp_path / "report.html").read_text())
     assert escape(shown.finding).replace("&#x27;", "&#39;") in text
-    row = r"<td>(lognormal|uniform)</td><td>preview</td><td>published controller</td>(<td>[-\d.]+</td>){3}<td>3</td>"
+    row = r"<td>(lognormal|uniform)</td><td>preview</td><td>published controller</td><td>movement</td><td>3</td>"
     assert len(re.findall(row, text)) == 2
     assert "constant offset between the client" in text
     assert heads(text)[:5] == ["movement", "paper, real UR3", "published controller", "preview", "targets"]
@@ -435,7 +435,9 @@ def test_experiments_of_one_controller_are_told_apart(
 ) -> None:
     first = build_tables(record_all(tmp_path / "a", PREVIEW))
     second = build_tables(record_all(tmp_path / "b", PREVIEW, **other))
-    assert side_by_side([first.table, second.table]).labels == labels
+    shown = side_by_side([first.table, second.table])
+    assert shown.labels == labels
+    assert [column.header for column in shown.shown()[1] if column.unit == "dB"][1:] == labels
 
 
 def test_own_movements_are_not_set_beside_the_paper(tmp_path: Path) -> None:
