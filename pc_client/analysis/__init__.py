@@ -3,6 +3,9 @@
     measures      the TCP path of a recording; the signal-to-noise ratio of its velocity (Eq. 10), errors,
                   and where the rest is lost
     run           a run as signals, what is measured on it, its figure
+    noise_floor   what the noise of the encoders leaves of a perfect arm, and of an error budget
+    inference     means with intervals, paired differences with their test
+    groups        groups of runs compared by a figure
     table         Table I: ours beside the paper's
     figures       bars and speeds of all movements; loads matplotlib, so import it only to draw
     report        one self-contained page from a folder of recordings

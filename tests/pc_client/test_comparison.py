@@ -70,14 +70,11 @@ def test_saved_sets_can_be_run_one_by_one(sets, tmp_path):
     save_sets(sets, tmp_path / "movements")
     assert len(list((tmp_path / "movements").glob("*.toml"))) == 2 * len(GENERATORS)
     assert load_movement(tmp_path / "movements" / "power_law_4_seed2.toml").kind == "power_law"
+    with pytest.raises(ClientError, match="at least one"):
+        make_sets(4, 1, 0)
     (tmp_path / "file").write_text("")
     with pytest.raises(ClientError, match="cannot use the folder"):
         save_sets(sets, tmp_path / "file" / "movements")
-
-
-def test_no_sets_are_refused():
-    with pytest.raises(ClientError, match="at least one"):
-        make_sets(4, 1, 0)
 
 
 def wave(frequency, t):
