@@ -319,12 +319,16 @@ def test_other_numbers_of_a_controller_are_no_column_of_their_own(reports: list[
     assert (alone.columns, alone.changed) == ((preview, quick), ())
 
 
-def test_terminal_table_fits_eighty_columns_and_gives_no_differences(reports: list[Report]) -> None:
-    console = Console(width=80)
+def test_terminal_tables_fit_eighty_columns_and_give_no_differences(
+    table: Table, reports: list[Report]
+) -> None:
+    console, together = Console(width=80), side_by_side([report.table for report in reports])
     with console.capture() as capture:
-        console.print(side_by_side([report.table for report in reports]).to_rich())
+        console.print(table.to_rich(), together.to_rich())
     text = capture.get()
     assert "…" not in text
+    assert "[mm]" in text
+    assert together.finding.count("dB (no interval; 1 pair) with") == 2
     assert "published controller, preview: SIMULATED UR3 3.15.8, seed 7" in text
     assert "29.90" in text
     for report in reports[:2]:
@@ -396,6 +400,8 @@ def test_the_same_paths_in_less_time_are_a_row_beside_the_own_pace_with_their_fl
     )
     shown = build_side_by_side([own, fast], tmp_path / "report.html")
     assert (shown.columns, shown.changed) == ((own.table,), (fast.table,))
+    other = build_tables(record_all(tmp_path / "other", PREVIEW, ("wave",)))
+    assert other.table.duration_in(own.table) is None
     text = (tmp_path / "report.html").read_text().partition('id="ours"')[2]
     assert "noise floor uniform" in text
     assert re.findall(r"<td>(1|0\.7)</td><td>1</td>", text) == ["1", "0.7"]

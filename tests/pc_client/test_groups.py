@@ -142,6 +142,7 @@ def test_a_sequence_is_grouped_by_what_differs(second, labels):
 
 def test_csv_has_all_digits_and_latex_is_a_tabular():
     groups = ur.compare({"50 % & more": of_movements(30), "a_b": of_movements(20)})
+    assert repr(groups).startswith("<Groups by snr_db>")
     rows = list(csv.DictReader(io.StringIO(groups.to_csv())))
     assert [row["group"] for row in rows] == ["50 % & more", "a_b", "50 % & more"]
     assert float(rows[0]["low"]) == groups.frame["low"][0]
@@ -164,3 +165,11 @@ def test_files_and_folders_stand_for_their_runs(tmp_path):
         ur.compare(of_movements(1), "name")
     with pytest.raises(ClientError, match="no run to compare"):
         ur.compare({"empty": tmp_path})
+
+
+def test_an_arm_that_repeated_more_often_weighs_no_more():
+    often, once = of_movements(30, seeds=(1,)), of_movements(20, seeds=(2,))[::3]
+    (group,) = ur.compare({"both": often + once}).frame.to_dicts()
+    assert group["mean"] == pytest.approx(
+        np.mean([np.mean([r.level for r in runs]) for runs in (often, once)])
+    )
