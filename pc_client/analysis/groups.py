@@ -45,9 +45,6 @@ class Groups:
     figure: str
     frame: pl.DataFrame
 
-    def __repr__(self) -> str:
-        return f"<Groups by {self.figure}>\n{self.frame}"
-
     def to_csv(self) -> str:
         """All values of the frame."""
         return to_csv(self.frame)

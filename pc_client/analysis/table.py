@@ -322,7 +322,10 @@ class SideBySide:
         names = []
         for table in self.columns:
             alike = [t.provenance for t in self.columns if t.label == table.label]
-            facts = {id(p): (p.robot, p.which, p.pace) for p in alike}
+            facts = {
+                id(p): (p.robot, f"serial {p.serial}" if p.seed is None else f"seed {p.seed}", p.pace)
+                for p in alike
+            }
             differ = [i for i, column in enumerate(zip(*facts.values(), strict=True)) if len(set(column)) > 1]
             names.append(", ".join([table.label, *(facts[id(table.provenance)][i] for i in differ)]))
         return [

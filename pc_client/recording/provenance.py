@@ -114,11 +114,6 @@ class Provenance:
         return f"{self.robot_model} {self.firmware}"
 
     @property
-    def which(self) -> str:
-        """Which arm of its model: by its seed, or else its serial number."""
-        return f"serial {self.serial}" if self.seed is None else f"seed {self.seed}"
-
-    @property
     def source(self) -> Source:
         """Columns of a table of the data: robot, software, serial, simulated."""
         return source_of(self.robot_model, self.firmware, self.serial, self.simulated)

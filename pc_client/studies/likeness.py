@@ -20,6 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.signal import find_peaks
 
 from pc_client.arrays import Array
 from pc_client.errors import ClientError
@@ -113,26 +114,15 @@ def peaks_of(speed: ArrayLike) -> list[int]:
     A peak counts when the speed has risen by 5 % of the highest from the dip before it and falls by as much
     after it.
     """
-    values = np.asarray(speed, dtype=np.float64).tolist()
-    step = _PROMINENCE * max(values, default=0.0)
-    peaks: list[int] = []
+    values = np.asarray(speed, dtype=np.float64)
+    step = _PROMINENCE * float(values.max(initial=0.0))
     if step <= 0.0:
-        return peaks
+        return []
     # The signal comes from rest and goes to rest, so a movement cut off at its top speed has a peak there.
-    low, top, top_at, climbing = 0.0, 0.0, 0, True
-    for index, value in enumerate([*values, 0.0]):
-        if climbing:
-            if value > top:
-                top, top_at = value, index
-            elif value <= top - step:
-                if top - low >= step:
-                    peaks.append(top_at)
-                low, climbing = value, False
-        elif value < low:
-            low = value
-        elif value >= low + step:
-            top, top_at, climbing = value, index, True
-    return peaks
+    # The slope makes the first of equal samples the highest, and is more than their rounding.
+    slope = np.linspace(0.0, 1e-9 * step, len(values))
+    found, _ = find_peaks(np.concatenate(([0.0], values - slope, [0.0])), prominence=step)
+    return [int(peak) - 1 for peak in found]
 
 
 def speed_peaks(speed: ArrayLike) -> int:
