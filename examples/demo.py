@@ -59,10 +59,10 @@ def main() -> int:
             for controller, folder in others:
                 run(arm, plans, 1, controller, out / folder, console)
             for controller, folder in shown:
-                run(arm, fast, 1, controller, out / "faster" / folder, console)
+                run(arm, fast, 1, controller, out / "faster" / f"{folder}-{FASTER:g}", console)
         reports = [build_report(out / folder, console) for _, folder in shown]
         reports += [build_tables(out / folder, console) for _, folder in others]
-        reports += [build_tables(out / "faster" / folder, console) for _, folder in shown]
+        reports += [build_tables(out / "faster" / f"{folder}-{FASTER:g}", console) for _, folder in shown]
         table = build_side_by_side(reports, out / "report.html")
     except ur.ClientError as error:
         sys.exit(f"demo: {error}")

@@ -139,8 +139,9 @@ def _trapezoid(up: float, down: float) -> NDArray[np.float64]:
 def _two_boxcars() -> NDArray[np.float64]:
     """A square of .8 s and two boxcars of .1 s, sampled with both ends."""
     boxcar = np.ones(101) / 101
-    wave: NDArray[np.float64] = np.convolve(np.convolve(np.ones(801), boxcar), boxcar)
-    return wave / (wave.sum() / 1000.0)
+    wave = np.convolve(np.convolve(np.ones(801), boxcar), boxcar)
+    shape: NDArray[np.float64] = wave / (wave.sum() / 1000.0)
+    return shape
 
 
 def _profiles() -> str:
