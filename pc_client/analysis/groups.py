@@ -117,7 +117,7 @@ def _by_what_differs(runs: Sequence[MeasuredRun]) -> dict[str, list[MeasuredRun]
 def _units_of(runs: Sequence[MeasuredRun], figure: str) -> pl.DataFrame:
     """A row for each movement on each arm: what its unit may be, and the mean of the figure (`value`)."""
     rows = [
-        (p.movement, str(p.target_points), f"{p.robot} {p.serial}", run.figures[figure])
+        (p.movement, str(p.target_points or "") or None, f"{p.robot} {p.serial}", run.figures[figure])
         for run in runs
         for p in [run.provenance]
     ]

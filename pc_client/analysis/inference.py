@@ -54,7 +54,8 @@ def mean_interval(values: ArrayLike) -> Interval:
 
 def paired_difference(a: ArrayLike, b: ArrayLike) -> Difference:
     """Of a - b; the values (n,) belong together one by one."""
-    x = np.asarray(a, dtype=np.float64) - np.asarray(b, dtype=np.float64)
+    with np.errstate(invalid="ignore"):  # endless levels of two perfect arms
+        x = np.asarray(a, dtype=np.float64) - np.asarray(b, dtype=np.float64)
     found, p = mean_interval(x), nan
     if np.isfinite(found.low):
         random = np.random.default_rng(_SEED)

@@ -152,13 +152,13 @@ class Table:
     def duration_in(self, other: Table) -> float | None:
         """The duration of the movements as a share of those through the same points of another table.
 
-        None where the movements are others.
+        None where the movements are others, or have no target points.
         """
         ours, theirs = (
             {(run.provenance.kind, run.provenance.target_points): run.errors.duration_s for run in t.all_runs}
             for t in (self, other)
         )
-        if ours.keys() != theirs.keys():
+        if ours.keys() != theirs.keys() or not all(points for _, points in ours):
             return None
         return round(sum(ours.values()) / sum(theirs.values()), 2)
 
@@ -356,7 +356,7 @@ class SideBySide:
             for of, several in groups.items()
             if (known := {name: group for name, group in several.items() if group})
             for row in compare(known).frame.to_dicts()
-            if row["minus"] and row["n"]
+            if row["minus"] and row["mean"] is not None
         ]
 
     @property

@@ -286,14 +286,14 @@ def record_all(
 ) -> Path:
     folder.mkdir()
     for k, movement in enumerate(movements):
-        prov = provenance(
-            movement=movement,
-            target_points=((0.1 * (k // 2), 0.0, 0.0), (0.1, 0.2, 0.3)),
-            kind="uniform" if movement.startswith("uniform") else "lognormal",
-            controller=config.title,
-            controller_config=asdict(config),
-            **changes,
-        )
+        whose: dict[str, Any] = {
+            "movement": movement,
+            "target_points": ((0.1 * (k // 2), 0.0, 0.0), (0.1, 0.2, 0.3)),
+            "kind": "uniform" if movement.startswith("uniform") else "lognormal",
+            "controller": config.title,
+            "controller_config": asdict(config),
+        }
+        prov = provenance(**whose | changes)
         lag = (0.1 + 0.01 * k) / config.gain_p
         record_movement(
             folder / f"{movement}_r1.mcap", lag=lag, noise=5e-6, seed=k, duration=duration, prov=prov
@@ -402,6 +402,10 @@ def test_the_same_paths_in_less_time_are_a_row_beside_the_own_pace_with_their_fl
     assert (shown.columns, shown.changed) == ((own.table,), (fast.table,))
     other = build_tables(record_all(tmp_path / "other", PREVIEW, ("wave",)))
     assert other.table.duration_in(own.table) is None
+    no_points = [
+        build_tables(record_all(tmp_path / f"{t}", PREVIEW, duration=t, target_points=())) for t in (2.0, 1.4)
+    ]
+    assert len(side_by_side([report.table for report in no_points]).columns) == 2
     text = (tmp_path / "report.html").read_text().partition('id="ours"')[2]
     assert "noise floor uniform" in text
     assert re.findall(r"<td>(1|0\.7)</td><td>1</td>", text) == ["1", "0.7"]

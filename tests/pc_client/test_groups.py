@@ -119,10 +119,20 @@ def test_repetitions_are_no_units_and_pairs_are_what_belongs_together(first, sec
 
 
 def test_what_shares_nothing_is_not_paired():
-    (*_, pair) = ur.compare(
-        {"a": of_movements(30), "b": of_movements(20, n=1, movement="x", seeds=(8,), target_points=())}
-    ).frame.to_dicts()
+    """Other movements on other arms; those without target points share none."""
+    first, second = (
+        of_movements(30, target_points=()),
+        of_movements(20, n=1, movement="x", seeds=(8,), target_points=()),
+    )
+    (*_, pair) = ur.compare({"a": first, "b": second}).frame.to_dicts()
     assert (pair["n"], pair["mean"], pair["p"]) == (0, None, None)
+
+
+def test_two_perfect_arms_differ_by_nothing_that_is_known():
+    (*_, pair) = ur.compare(
+        {"a": of_movements(math.inf), "b": of_movements(math.inf, controller="paper")}
+    ).frame.to_dicts()
+    assert (pair["n"], pair["mean"], pair["p"]) == (4, None, None)
 
 
 @pytest.mark.parametrize(
