@@ -393,6 +393,13 @@ def test_the_papers_finding_is_set_beside_ours_with_pairs_and_interval(tmp_path:
     assert side_by_side([one_kind.table]).finding == ""
 
 
+def test_the_page_says_how_much_of_the_position_error_is_a_constant_offset(tmp_path: Path) -> None:
+    record_movement(tmp_path / "a_r1.mcap", offset=(0.003, 0.004, 0.0), noise=1e-7)
+    (said,) = side_by_side([build_tables(tmp_path).table]).offsets
+    assert said.startswith("preview: 5.0 mm, there the constant offset")
+    assert said.endswith("is 5.0 mm; without it and the lag 0.0 mm are left.")
+
+
 def test_the_same_paths_in_less_time_are_a_row_beside_the_own_pace_with_their_floors(tmp_path: Path) -> None:
     own = build_tables(record_all(tmp_path / "own", PREVIEW))
     fast = build_tables(

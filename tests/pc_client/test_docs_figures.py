@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.special import ndtr
+from typer.testing import CliRunner
 
+from pc_client.cli import app
+from pc_client.movements.description import describe
 from pc_client.movements.durations import Isochrony
 from pc_client.movements.generate import GENERATORS
 from pc_client.movements.lognormal import LiteralTiming, Lognormal, TwoSidedTiming, lead_from_k
+from pc_client.movements.movement import Movement
 from pc_client.movements.power_law import TORSION_EXPONENT, TWO_THIRDS
 from pc_client.studies.comparison import make_sets
 
@@ -93,3 +98,31 @@ def test_a_literal_window_has_its_top_speed_in_the_middle_and_k_tells_its_lead(l
     assert timing.k == pytest.approx(k, rel=1e-14)
     assert lead_from_k(timing.k, 1.0) == pytest.approx(lead, abs=1e-13)
     assert timing.lognormal.mode == pytest.approx(0.5, abs=1e-12)
+
+
+def test_every_source_of_the_theory_is_cited_and_every_citation_has_its_source() -> None:
+    text, _, sources = (
+        (DOCS / "theory.md").read_text(encoding="utf-8").replace("\\", "").partition("## 9. Sources")
+    )
+    cited = {
+        int(n) for numbers in re.findall(r"(?<!\!)\[([\d, ]+)\](?!\()", text) for n in numbers.split(",")
+    }
+    assert cited == {int(n) for n in re.findall(r"^(\d+)\. ", sources, re.MULTILINE)}
+
+
+def test_what_human_is_stands_where_people_choose_it() -> None:
+    movement = Movement.through([[0.3, -0.1, 0.2], [0.35, 0.0, 0.25], [0.3, 0.1, 0.2]], style="human")
+    sigmas = [stroke["sigma"] for stroke in describe(movement)["strokes"]]
+    assert sigmas == pytest.approx([0.067] * 2, abs=5e-4)
+    at = np.cumsum(movement.stroke_durations)[:1]
+    assert movement.speed(at)[0] < 1e-3
+    help_text = CliRunner().invoke(app, ["movements", "new", "--help"], env={"COLUMNS": "200"}).output
+    shown = [
+        Movement.through.__doc__,
+        help_text,
+        *((DOCS / page).read_text() for page in ("movements.md", "library.md")),
+    ]
+    for text in shown:
+        words = " ".join(re.sub(r"[│|]", " ", text or "").split())
+        assert "sigma .067" in words
+        assert "at rest at each" in words
