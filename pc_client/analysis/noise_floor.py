@@ -22,21 +22,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import suppress
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 
-from pc_client.analysis.measures import decibels, rest_samples, speed, steps_of, velocity
+from pc_client.analysis.measures import TcpTrack, rest_samples, speed, steps_of, velocity
 from pc_client.arrays import Array
 from pc_client.control.loop import LoopModel, velocity_response
 from pc_client.errors import CellError
 from pc_client.files import FILE_KINDS
 from pc_client.kinematics.arms import ROBOTS
 from pc_client.kinematics.model import RobotModel, robot_model, tcp_jacobian
+from pc_client.recording.recording import Recording
 from ur_hil.cell import NO_CELL, parse_cell
-
-if TYPE_CHECKING:
-    from pc_client.analysis.run import MeasuredRun
 
 _NODES = 5
 """Nodes of the Gauss-Hermite rule an axis: exact for polynomials up to the ninth degree."""
@@ -46,7 +44,16 @@ LEAST_STEPS = 25
 One run on a CB3 has 29."""
 
 
-def step_covariance(runs: Sequence[MeasuredRun]) -> Array | None:
+class _Tracked(Protocol):
+    """A run: its recording, and the TCP path of it."""
+
+    @property
+    def recording(self) -> Recording: ...
+    @property
+    def track(self) -> TcpTrack: ...
+
+
+def step_covariance(runs: Sequence[_Tracked]) -> Array | None:
     """Return C (6, 6) [rad2] of all runs of one arm together; None with fewer than `LEAST_STEPS` steps."""
     stretches = []
     for run in runs:
@@ -63,7 +70,7 @@ def step_covariance(runs: Sequence[MeasuredRun]) -> Array | None:
     return covariance
 
 
-def noise_power(run: MeasuredRun, covariance: Array | None) -> tuple[float, float] | None:
+def noise_power(run: _Tracked, covariance: Array | None) -> tuple[float, float] | None:
     """Return what noise adds to the power of the speed error of a run by its mean and its variance [(m/s)2].
 
     None for an unknown arm or without rest. The noise is seen through the reference and the time stamps; C is
@@ -78,12 +85,6 @@ def noise_power(run: MeasuredRun, covariance: Array | None) -> tuple[float, floa
     noise = jacobians @ covariance @ jacobians.transpose(0, 2, 1) / np.square(dt)[:, None, None]
     mean, variance = speed_noise(velocity(track.t, track.p_ref)[inside], noise)
     return float(np.mean(np.square(mean))), float(np.mean(variance))
-
-
-def floor_db(run: MeasuredRun) -> float | None:
-    """Return the SNR [dB] at which noise alone would leave a run; None where the noise is not known."""
-    power, signal = sum(run.noise), run.budget.signal_power
-    return decibels(signal, power) if power > 0.0 < signal else None
 
 
 def speed_noise(v: Array, covariance: Array) -> tuple[Array, Array]:
@@ -106,7 +107,7 @@ def speed_noise(v: Array, covariance: Array) -> tuple[Array, Array]:
     return mean, np.maximum(variance, 0.0)
 
 
-def unrepeatable_power(runs: Sequence[MeasuredRun]) -> float | None:
+def unrepeatable_power(runs: Sequence[_Tracked]) -> float | None:
     """Return half the mean square difference [(m/s)2] of the speeds of two runs, as if driven alike.
 
     What the commands of the second differ by from those of the first (learned or fed back) is taken out
@@ -123,7 +124,7 @@ def unrepeatable_power(runs: Sequence[MeasuredRun]) -> float | None:
     return float(np.mean(halves)) if halves else None
 
 
-def _as_driven_like(first: MeasuredRun, second: MeasuredRun) -> Array | None:
+def _as_driven_like(first: _Tracked, second: _Tracked) -> Array | None:
     """Return the positions (n, 3) [m] of the second run as they would be with the commands of the first."""
     loop, model = _loop_of(first), _nominal(first)
     if loop is None or model is None or len(first.track.t) != len(second.track.t):
@@ -140,24 +141,24 @@ def _as_driven_like(first: MeasuredRun, second: MeasuredRun) -> Array | None:
     return positions
 
 
-def _jacobians(run: MeasuredRun, model: RobotModel) -> Array:
+def _jacobians(run: _Tracked, model: RobotModel) -> Array:
     """From joint velocities to that of the TCP, along the reference of a run, (n, 3, 6)."""
     q = run.recording.column("ref_q")[run.track.rows]
     return np.array([tcp_jacobian(model, q_k)[:3] for q_k in q])
 
 
-def _nominal(run: MeasuredRun) -> RobotModel | None:
+def _nominal(run: _Tracked) -> RobotModel | None:
     """The nominal arm of a run, with its TCP; None for an unknown arm."""
-    name, text = run.provenance.robot_model.lower(), run.provenance.cell_text
+    name, text = run.recording.provenance.robot_model.lower(), run.recording.provenance.cell_text
     cell = NO_CELL
     with suppress(CellError):  # the report says what is wrong with it
         cell = parse_cell(text, "recording", FILE_KINDS["cell"]) if text else NO_CELL
     return robot_model(name, cell) if name in ROBOTS else None
 
 
-def _loop_of(run: MeasuredRun) -> LoopModel | None:
+def _loop_of(run: _Tracked) -> LoopModel | None:
     """The loop that the client identified; None in old recordings."""
-    loop, delay = run.provenance.loop, run.provenance.identified_delay_s
+    loop, delay = run.recording.provenance.loop, run.recording.provenance.identified_delay_s
     if loop.keys() >= {"dead_time_s", "lag_s", "joint_spread_s"}:
         dead_time, lag, spread = (float(loop[x]) for x in ("dead_time_s", "lag_s", "joint_spread_s"))
         return LoopModel(dead_time, lag, spread, 0.0)

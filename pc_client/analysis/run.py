@@ -228,6 +228,12 @@ class MeasuredRun:
         covariance = step_covariance([self]) if self.covariance is None else self.covariance
         return noise_power(self, covariance) or (0.0, 0.0)
 
+    @property
+    def floor_db(self) -> float | None:
+        """The SNR [dB] at which noise alone would leave the run; None where the noise is not known."""
+        power, signal = sum(self.noise), self.budget.signal_power
+        return measures.decibels(signal, power) if power > 0.0 < signal else None
+
     @cached_property
     def budget(self) -> measures.Budget:
         """The power of the speed error by its parts."""

@@ -21,7 +21,7 @@ from scipy import stats
 
 from pc_client.analysis.groups import compare
 from pc_client.analysis.measures import decibels
-from pc_client.analysis.noise_floor import floor_db, step_covariance, unrepeatable_power
+from pc_client.analysis.noise_floor import step_covariance, unrepeatable_power
 from pc_client.analysis.run import GIVEN_UP, MeasuredRun
 from pc_client.errors import RecordingError
 from pc_client.recording.provenance import Provenance
@@ -244,7 +244,7 @@ def build_table(runs: Sequence[MeasuredRun]) -> Table:
     by_name = {name: tuple(group) for name, group in groupby(ordered, lambda run: run.provenance.movement)}
     frame = _frame_of_runs(ordered).group_by("name", maintain_order=True).agg(_FIGURES)
     levels = {
-        "noise_floor_db": [floor_db(group[0]) for group in by_name.values()],
+        "noise_floor_db": [group[0].floor_db for group in by_name.values()],
         # What does not repeat from run to run would leave this; None when it is not known.
         "unrepeatable_db": [
             decibels(group[0].budget.signal_power, power) if (power := unrepeatable_power(group)) else None

@@ -24,7 +24,7 @@ from pc_client.analysis.measures import (
     track_of,
     velocity,
 )
-from pc_client.analysis.noise_floor import floor_db, speed_noise, step_covariance, unrepeatable_power
+from pc_client.analysis.noise_floor import speed_noise, step_covariance, unrepeatable_power
 from pc_client.analysis.run import MeasuredRun, analyse_run
 from pc_client.analysis.table import build_table
 from pc_client.control.loop import LoopModel, velocity_response
@@ -257,7 +257,7 @@ def record_joints(path: Path, seed: int, *, ripple: float = 0.0, push: float = 0
 
 
 def floor_of(runs: list[MeasuredRun]) -> float | None:
-    return floor_db(replace(runs[0], covariance=step_covariance(runs)))
+    return replace(runs[0], covariance=step_covariance(runs)).floor_db
 
 
 @pytest.fixture(scope="module")
@@ -272,7 +272,7 @@ def test_a_perfect_arm_stands_on_its_floor(perfect: list[MeasuredRun]) -> None:
     np.testing.assert_allclose(np.sqrt(np.diag(covariance)), math.sqrt(2) * SIGMA, rtol=0.15)
     snr = np.mean([run.snr.speed_db for run in perfect])
     # the derivation, and then with what so few frames at rest tell of the noise
-    assert snr == pytest.approx(floor_db(replace(perfect[0], covariance=np.diag(2 * SIGMA**2))), abs=0.2)
+    assert snr == pytest.approx(replace(perfect[0], covariance=np.diag(2 * SIGMA**2)).floor_db, abs=0.2)
     assert snr == pytest.approx(floor_of(perfect), abs=0.5)
 
 
@@ -329,11 +329,11 @@ def test_an_endless_margin_is_null_in_json(tmp_path: Path) -> None:
 def test_without_rest_or_a_known_arm_there_is_no_floor(tmp_path: Path, perfect: list[MeasuredRun]) -> None:
     short = analyse_run(load_recording(record_movement(tmp_path / "a.mcap", rest=0.1)))
     assert step_covariance([short]) is None
-    assert floor_db(short) is None
+    assert short.floor_db is None
     strange = analyse_run(
         load_recording(record_movement(tmp_path / "b.mcap", prov=provenance(robot_model="unknown")))
     )
-    assert floor_db(replace(strange, covariance=step_covariance(perfect))) is None
+    assert replace(strange, covariance=step_covariance(perfect)).floor_db is None
     assert build_table([strange]).to_json()["rows"][0]["noise_floor_db"] is None
 
 
