@@ -19,6 +19,8 @@ from typing import TYPE_CHECKING, Any
 from ur_hil import check_packages
 
 if TYPE_CHECKING:
+    from pc_client.analysis.groups import Groups as Groups
+    from pc_client.analysis.groups import compare as compare
     from pc_client.analysis.signals import Run as Run
     from pc_client.analysis.signals import Signals as Signals
     from pc_client.arm import Arm as Arm
@@ -46,6 +48,7 @@ _HOMES = {
     "ClientError": "pc_client.errors",
     "Controller": "pc_client.control.controller",
     "Gripper": "pc_client.driver.gripper",
+    "Groups": "pc_client.analysis.groups",
     "JointTrajectory": "pc_client.movements.samples",
     "Movement": "pc_client.movements.movement",
     "Plan": "pc_client.planning.plan",
@@ -56,6 +59,7 @@ _HOMES = {
     "Solid": "ur_hil.cell",
     "Tool": "ur_hil.cell",
     "Wall": "ur_hil.cell",
+    "compare": "pc_client.analysis.groups",
     "connect": "pc_client.arm",
     "drawing": "pc_client.studies.drawing.drawing",
     "plan": "pc_client.arm",

@@ -17,7 +17,10 @@ from protocol.ur_types import Ports, SoftwareVersion
 PROTOCOL = sorted((DOCS / "protocol").glob("*.md"))
 
 
-@pytest.mark.parametrize("path", PAGES)
+COSTLY = {"movements.md": [pytest.mark.nightly]}  # thirty-five plans
+
+
+@pytest.mark.parametrize("path", [pytest.param(path, marks=COSTLY.get(path, ())) for path in PAGES])
 def test_a_page_is_what_its_tables_make(path):
     assert (DOCS / path).read_text(encoding="utf-8") == page(path), "run: make docs"
 

@@ -11,6 +11,17 @@ import pytest
 NOTEBOOKS = sorted((Path(__file__).parents[1] / "examples" / "notebooks").glob("*.ipynb"))
 FEWER = {"repeat_the_paper": ('numbers = ("4_1", "4_2", "5_1", "5_2", "5_3")', 'numbers = ("4_1",)')}
 """What a notebook says of its ten movements, and what shows the same with two of them."""
+HELD = {
+    "my_own_controller": """
+from pc_client.analysis.measures import snr_db, speed
+for signals in mine.values():
+    moving = signals.t <= plan.movement.duration
+    t, p = signals.t[moving], signals.tcp_pose[moving, :3]
+    wanted = snr_db(speed(t, plan.movement.sample(t).p), speed(t, p))
+    assert judge(signals).endswith(f"{wanted:.1f} dB")
+"""
+}
+"""What must hold at the end of a notebook: the Eq. 10 that it spells out is that of the reports."""
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
@@ -43,6 +54,7 @@ def test_a_notebook_runs(path, kernel):
         (cell,) = [cell for cell in notebook.cells if ten in cell.source]
         cell.source = cell.source.replace(ten, two)
     notebook.cells.insert(0, nbformat.v4.new_code_cell("%reset -f"))
+    notebook.cells.insert(-1, nbformat.v4.new_code_cell(HELD.get(path.stem, "")))
     client = NotebookClient(notebook, timeout=300, km=kernel)
     try:
         client.execute()

@@ -12,17 +12,20 @@ from docs.generate import (
     dashboard_page,
     gripper_page,
     interpreter_page,
+    movements_page,
     port_map_page,
     ports_page,
     primary_page,
     programs_page,
     realtime_page,
+    results_page,
     robot_api_page,
     rtde_page,
     scripts_page,
     security_page,
     security_policy,
     states_page,
+    theory_page,
 )
 from docs.generate.sessions import with_sessions
 
@@ -30,8 +33,11 @@ DOCS = Path(__file__).parents[1]
 _LAYOUT = tomllib.loads((DOCS.parent / ".mdformat.toml").read_text(encoding="utf-8"))
 PAGES: dict[str, Callable[[], str]] = {
     "control.md": control_page.render,
+    "movements.md": movements_page.render,
     "programs.md": programs_page.render,
+    "results.md": results_page.render,
     "states.md": states_page.render,
+    "theory.md": theory_page.render,
     "urscript-coverage.md": coverage_page.render,
     "protocol/README.md": ports_page.render,
     "protocol/dashboard.md": dashboard_page.render,

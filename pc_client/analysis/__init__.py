@@ -4,6 +4,9 @@
                   and where the rest is lost
     run           a recording and all that is measured on it
     signals       a motion as arrays, for programs that import the client
+    noise_floor   what the noise of the encoders leaves of a perfect arm, and of an error budget
+    inference     means with intervals, paired differences with their test
+    groups        groups of runs compared by a figure
     table         Table I: ours beside the paper's
     figures       bars and speeds of all movements; loads matplotlib, so import it only to draw
     report        one self-contained page from a folder of recordings

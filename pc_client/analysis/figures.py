@@ -10,7 +10,7 @@ import numpy as np
 import polars as pl
 from matplotlib.figure import Figure
 
-from pc_client.analysis.measures import PARTS, joint_errors, position_errors, speed
+from pc_client.analysis.measures import PARTS, joint_errors, position_errors, speed, steps_of
 from pc_client.analysis.run import MeasuredRun, budget_column
 from pc_client.analysis.table import Table
 from pc_client.arrays import Array
@@ -222,11 +222,13 @@ def _plot_joints(axes: Any, t: Array, values: Array) -> None:
 
 
 def _speed(run: MeasuredRun, *, desired: bool = False) -> Array:
-    """TCP speed at each first difference [m/s]."""
+    """TCP speed at each step [m/s]."""
     return speed(run.track.t, run.track.p_ref if desired else run.track.p_actual)
 
 
 def _step_times(run: MeasuredRun) -> Array:
-    """The middle of each first difference, s since the movement began."""
+    """The middle of each step, s since the movement began."""
     t = run.track.t
-    return 0.5 * (t[1:] + t[:-1]) - run.track.t_start
+    begins, ends = steps_of(t)
+    middle: Array = 0.5 * (t[begins] + t[ends]) - run.track.t_start
+    return middle

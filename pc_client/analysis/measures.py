@@ -1,14 +1,15 @@
 """The TCP path of a run, and what is measured on it: signal-to-noise ratios, errors, where the rest is lost.
 
-The path is reference and actual position at the same controller time stamps, 8 ms apart, as the paper's were:
-of an arm with 500 Hz, every fourth frame is a sample. Both go through the same operator, the first difference
-over the time between two samples, so that a perfect arm gives a perfect figure.
+The path is reference and actual position at the same controller time stamps. Both go through the same
+operator, the difference of two samples 8 ms apart, as the paper's were, over the time between them, so that
+a perfect arm gives a perfect figure. At 125 Hz these are neighbours. At 500 Hz each sample is set against the
+one four before it: all samples count, and the noise of the encoders weighs as much as at 125 Hz.
 
 The signal-to-noise ratio of the TCP velocity is the figure by which the paper judges a robot:
 
     SNR = 10 log10( P(v_pc) / P(v_ur3 - v_pc) )                                             Eq. 10
 
-`speed_db` is this, exactly: v is the scalar TCP speed, the first difference of positions, v_pc of the
+`speed_db` is this, exactly: v is the scalar TCP speed, the difference of positions, v_pc of the
 reference and v_ur3 of the position that the robot reports, at the same controller time stamps, over the
 movement phase, neither shifted nor smoothed. P is the mean square. The other figures stand under their own
 names beside it:
@@ -30,7 +31,7 @@ The budget cuts the power of the speed error into parts that add up to it:
     slow rest       below 6 Hz, less the noise: friction, settling, limits of acceleration, slow gear ripple
     fast rest       above 6 Hz, less the noise: gear ripple (101 cycles a joint turn pass 6 Hz at 0.4 rad/s),
                     jitter of the command stream
-    noise           what the differenced position shows at rest, turned into noise of the speed: its variance
+    noise           that of the encoders at rest, turned into noise of the speed (`noise_floor`): its variance
                     is taken from the fast rest, what it adds to the mean of the speed near rest from the slow
 
 Each part is the drop in mean square error from one step to the next, so no part is counted twice. What is
@@ -56,8 +57,8 @@ from pc_client.errors import RecordingError
 from pc_client.recording.recording import Recording
 from pc_client.recording.rows import Phase
 
-# Fewer samples than this are no movement: 80 ms.
-_MIN_MOVEMENT_ROWS = 10
+# Fewer steps of 8 ms than this are no movement.
+_MIN_MOVEMENT_STEPS = 10
 
 _SHORTEST_CYCLE, _LONGEST_CYCLE = 0.5e-3, 0.05
 """Median steps of time stamps outside are of no robot [s]: UR's control cycles are 8 and 2 ms."""
@@ -83,8 +84,7 @@ class TcpTrack:
         t: (n,) controller time in s, strictly rising.
         p_ref: (n, 3) reference position at these times, m.
         p_actual: (n, 3) position that the robot reported at these times, m.
-        rows: index of each sample's row in the recording, (n,).
-        new_rows: index of every row with a time stamp of its own, (m,): of each control cycle.
+        rows: index of each sample's row in the recording, (n,): of every row with a time stamp of its own.
         movement: samples first..last of the movement phase, as a slice.
         t_begin: controller time at which the movement began, s: up to a cycle before its first sample.
     """
@@ -93,14 +93,15 @@ class TcpTrack:
     p_ref: Array
     p_actual: Array
     rows: NDArray[np.intp]
-    new_rows: NDArray[np.intp]
     movement: slice
     t_begin: float
 
     @property
     def movement_steps(self) -> slice:
-        """The first differences that lie wholly inside the movement: step k is sample k to k + 1."""
-        return slice(self.movement.start, self.movement.stop - 1)
+        """The steps of `velocity` that lie wholly inside the movement."""
+        begins, ends = steps_of(self.t)
+        first = np.searchsorted(begins, self.movement.start)
+        return slice(int(first), int(np.searchsorted(ends, self.movement.stop)))
 
     @property
     def t_start(self) -> float:
@@ -116,67 +117,69 @@ class TcpTrack:
 def track_of(recording: Recording) -> TcpTrack:
     """Take the TCP path out of a recording.
 
-    Rows that repeat a time stamp (a heartbeat of a standing controller) are left out, and those between two
-    samples; the first row of the movement is one.
+    Rows that repeat a time stamp (a heartbeat of a standing controller) are left out.
 
     Raises:
         RecordingError: signals are missing, or the movement phase is too short to be judged.
     """
     t = recording.t
     with np.errstate(invalid="ignore"):  # endless times are refused below
-        new_rows = np.flatnonzero(np.diff(t, prepend=-np.inf) > 0.0)
-    moving = _movement_of(recording, new_rows)
+        rows = np.flatnonzero(np.diff(t, prepend=-np.inf) > 0.0)
+    moving = np.flatnonzero(recording.rows_of(Phase.MOVEMENT)[rows])
+    least = _MIN_MOVEMENT_STEPS * _rows_per_step(t[rows])
+    if len(moving) < least:
+        raise RecordingError(
+            f"{recording.path} has {len(moving)} samples of movement; at least {least} are needed"
+        )
     for name, most in _MOST.items():
         if not np.all(np.abs(recording.column(name)) <= most):  # NaN is not
             raise RecordingError(f"{recording.path} has {name} with values beyond {most:g}, or not a number")
-    if not np.all(np.diff(t[new_rows]) > 0.0):
+    if not np.all(np.diff(t[rows]) > 0.0):
         raise RecordingError(f"{recording.path} has time stamps that go back; those of a robot do not")
-    cycle = float(np.median(np.diff(t[new_rows])))
+    cycle = _cycle(t[rows])
     if not _SHORTEST_CYCLE <= cycle <= _LONGEST_CYCLE:
         raise RecordingError(
             f"{recording.path} has time stamps {cycle:g} s apart; {_SHORTEST_CYCLE:g} to "
             f"{_LONGEST_CYCLE:g} s are a robot's"
         )
-    each = rows_per_sample(t[new_rows])
-    rows = new_rows[moving[0] % each :: each]
-    moving = _movement_of(recording, rows)
     return TcpTrack(
         t=t[rows],
         p_ref=recording.column("ref_tcp_position")[rows],
         p_actual=recording.column("actual_TCP_pose")[rows, :3],
         rows=rows,
-        new_rows=new_rows,
         movement=slice(int(moving[0]), int(moving[-1]) + 1),
         t_begin=float((t - recording.column("ref_t"))[rows[moving[0]]]),
     )
 
 
-def rows_per_sample(t: Array) -> int:
-    """How many steps of the times (n,) [s] make 8 ms: 1 at 125 Hz, 4 at 500 Hz."""
-    return 1 if len(t) < 2 else max(round(SAMPLING_TIME / float(np.median(np.diff(t)))), 1)
+def _cycle(t: Array) -> float:
+    return float(np.median(np.diff(t))) if len(t) > 1 else SAMPLING_TIME
 
 
-def _movement_of(recording: Recording, rows: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Which of these rows (n,) are of the movement phase; RecordingError if they are too few."""
-    moving = np.flatnonzero(recording.rows_of(Phase.MOVEMENT)[rows])
-    if len(moving) < _MIN_MOVEMENT_ROWS:
-        raise RecordingError(
-            f"{recording.path} has {len(moving)} samples of movement; at least {_MIN_MOVEMENT_ROWS} "
-            "are needed"
-        )
-    return moving
+def _rows_per_step(t: Array) -> int:
+    """How many samples at times (n,) [s] make 8 ms: 1 at 125 Hz, 4 at 500 Hz."""
+    return max(round(SAMPLING_TIME / _cycle(t)), 1)
+
+
+def steps_of(t: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Samples at which steps over times (n,) [s] begin and end: each sample ends one that began 8 ms before.
+
+    Where that frame is lost the step begins at the last one before, and is longer; no other is moved by it.
+    """
+    each = _rows_per_step(t)
+    ends = np.arange(each, len(t))
+    begins = np.searchsorted(t, t[ends] - (each - 0.5) * _cycle(t)) - 1
+    return np.maximum(begins, 0), ends
 
 
 def velocity(t: Array, p: Array) -> Array:
-    """First differences of positions (n, 3) [m] over times (n,) [s]: (n - 1, 3) m/s.
-
-    Step k is from sample k to k + 1.
-    """
-    return np.diff(p, axis=0) / np.diff(t)[:, None]
+    """Differences of positions (n, 3) [m] over the steps of the times (n,) [s]: (m, 3) m/s."""
+    begins, ends = steps_of(t)
+    return (p[ends] - p[begins]) / (t[ends] - t[begins])[:, None]
 
 
 def speed(t: Array, p: Array) -> Array:
-    """Length of `velocity`, (n - 1,) m/s: the scalar TCP speed."""
+    """Length of `velocity`, (m,) m/s: the scalar TCP speed."""
     length: Array = np.linalg.norm(velocity(t, p), axis=1)
     return length
 
@@ -205,9 +208,6 @@ PARTS = ("delay", "scale and ramp", "slow rest", "fast rest", "noise")
 """Of the budget."""
 
 _SHORTEST_REST = 8
-
-_NODES = 5
-"""Nodes of the Gauss-Hermite rule an axis: exact for polynomials up to the ninth degree."""
 
 _VelocityOf = Callable[[Array, Array], Array]
 
@@ -255,11 +255,11 @@ def measure_snr(track: TcpTrack) -> Snr:
 def _best_lag(track: TcpTrack, velocity_of: _VelocityOf) -> float:
     """Return the delay in s of the reference that leaves the least square error.
 
-    A scan in steps of one control cycle finds the valley, a bounded search its bottom, far below one cycle.
-    The error is summed over one window for all lags, the movement and as much after it as the longest lag
-    needs, so that the sum is a smooth function of the lag.
+    A scan in steps of 8 ms finds the valley, a bounded search its bottom, far below one cycle. The error is
+    summed over one window for all lags, the movement and as much after it as the longest lag needs, so that
+    the sum is a smooth function of the lag.
     """
-    cycle = float(np.median(np.diff(track.t)))
+    cycle = _cycle(track.t)
     start = max(0, track.movement.start + math.floor(_MIN_LAG_S / cycle))
     stop = min(len(track.t), track.movement.stop + math.ceil(_MAX_LAG_S / cycle))
     window = slice(start, stop)
@@ -269,10 +269,11 @@ def _best_lag(track: TcpTrack, velocity_of: _VelocityOf) -> float:
     def error(lag: float) -> float:
         return float(np.sum(np.square(actual - velocity_of(t, reference(lag, window)))))
 
-    lags = np.arange(_MIN_LAG_S, _MAX_LAG_S + cycle / 2, cycle)
+    scan = max(cycle, SAMPLING_TIME)
+    lags = np.arange(_MIN_LAG_S, _MAX_LAG_S + scan / 2, scan)
     coarse = float(lags[np.argmin([error(lag) for lag in lags])])
     fine = minimize_scalar(
-        error, bounds=(coarse - cycle, coarse + cycle), method="bounded", options={"xatol": 1e-7}
+        error, bounds=(coarse - scan, coarse + scan), method="bounded", options={"xatol": 1e-7}
     )
     return float(fine.x)
 
@@ -285,13 +286,14 @@ def _shifted_pair(track: TcpTrack, lag_s: float, velocity_of: _VelocityOf) -> tu
     Raises:
         RecordingError: too little of the movement is left.
     """
-    half_cycle = 0.5 * float(np.median(np.diff(track.t)))
+    half_cycle = 0.5 * _cycle(track.t)
     shifted_t = track.t - lag_s
     inside = np.flatnonzero((shifted_t > track.t_start - half_cycle) & (shifted_t < track.t_end + half_cycle))
-    if len(inside) < _MIN_MOVEMENT_ROWS:
+    least = _MIN_MOVEMENT_STEPS * _rows_per_step(track.t)
+    if len(inside) < least:
         raise RecordingError(
             f"{len(inside)} samples of movement are left after the best shift of {lag_s:.3f} s; "
-            f"at least {_MIN_MOVEMENT_ROWS} are needed"
+            f"at least {least} are needed"
         )
     window = slice(int(inside[0]), int(inside[-1]) + 1)
     positions = _shifted_reference(track)(lag_s, window), track.p_actual[window]
@@ -314,7 +316,6 @@ class Errors:
         rms_joint_error_mrad: (6,) its root mean square.
         peak_speed_mm_s: top TCP speed of the reference.
         duration_s: length of the movement phase.
-        noise_floor_mm_s: root mean square of the differenced position at rest, one axis; None without rest.
     """
 
     max_position_error_mm: float
@@ -326,7 +327,6 @@ class Errors:
     rms_joint_error_mrad: tuple[float, ...]
     peak_speed_mm_s: float
     duration_s: float
-    noise_floor_mm_s: float | None
 
 
 def measure_errors(recording: Recording, track: TcpTrack, lag_s: float) -> Errors:
@@ -338,7 +338,6 @@ def measure_errors(recording: Recording, track: TcpTrack, lag_s: float) -> Error
     path_distance = 1e3 * np.linalg.norm(path_error - offset, axis=1)
     joint_error = 1e3 * joint_errors(recording, track)[moving]
     ref_speed = speed(track.t, track.p_ref)[track.movement_steps]
-    noise = rest_noise(recording, track)
     x, y, z = (float(v) for v in 1e3 * offset)
     return Errors(
         max_position_error_mm=float(distance.max()),
@@ -350,7 +349,6 @@ def measure_errors(recording: Recording, track: TcpTrack, lag_s: float) -> Error
         rms_joint_error_mrad=tuple(_rms(column) for column in joint_error.T),
         peak_speed_mm_s=float(1e3 * ref_speed.max()),
         duration_s=track.t_end - track.t_start,
-        noise_floor_mm_s=None if noise is None else float(1e3 * np.sqrt(np.trace(noise) / 3.0)),
     )
 
 
@@ -366,19 +364,6 @@ def position_errors(track: TcpTrack) -> Array:
     return distance
 
 
-def rest_noise(recording: Recording, track: TcpTrack) -> Array | None:
-    """Return the covariance (3, 3) of the differenced position at rest, (m/s)^2: the noise floor of velocity.
-
-    A slow drift (the mean velocity of each rest) is taken out. None when no phase of rest is long enough.
-    """
-    rests = [velocity(track.t[s], track.p_actual[s]) for s in rest_samples(recording, track)]
-    if not rests:
-        return None
-    v = np.concatenate([one - one.mean(axis=0) for one in rests])
-    covariance: Array = v.T @ v / (len(v) - len(rests))
-    return covariance
-
-
 def rest_samples(recording: Recording, track: TcpTrack) -> list[NDArray[np.intp]]:
     """Samples of the track at rest, for each settling phase: the half that is farther from the movement."""
     phase = recording.column("phase")[track.rows]
@@ -390,26 +375,6 @@ def rest_samples(recording: Recording, track: TcpTrack) -> list[NDArray[np.intp]
 
 def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(np.square(values))))
-
-
-def speed_noise(v: Array, covariance: Array) -> tuple[Array, Array]:
-    """Mean (n,) [m/s] and variance (n,) [(m/s)2] of |v + n| - |v|, n being normal with mean zero.
-
-    The velocities are (n, 3) [m/s], the covariance of n is (n, 3, 3) or (3, 3) [(m/s)2]. By Gauss-Hermite
-    quadrature.
-    """
-    nodes, weights = np.polynomial.hermite_e.hermegauss(_NODES)
-    grid = np.stack(np.meshgrid(nodes, nodes, nodes, indexing="ij"), axis=-1).reshape(-1, 3)
-    share = np.einsum("i,j,k->ijk", weights, weights, weights).ravel()
-    share /= share.sum()
-    # A root of each covariance; a tiny negative eigenvalue is rounding.
-    values, vectors = np.linalg.eigh(np.broadcast_to(covariance, (len(v), 3, 3)))
-    roots = vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :]
-    noisy = np.linalg.norm(v[:, None, :] + grid @ roots.transpose(0, 2, 1), axis=2)
-    excess = noisy - np.linalg.norm(v, axis=1)[:, None]
-    mean: Array = excess @ share
-    variance: Array = np.square(excess) @ share - np.square(mean)
-    return mean, np.maximum(variance, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -435,14 +400,19 @@ class Budget:
         return decibels(self.signal_power, self.parts[part]) if self.signal_power > 0.0 else math.inf
 
 
-def error_budget(recording: Recording, track: TcpTrack, lag_s: float) -> Budget:
-    """Cut the power of the speed error of one run into its parts; the best shift is that of the speed [s]."""
+def error_budget(track: TcpTrack, lag_s: float, noise: tuple[float, float]) -> Budget:
+    """Cut the power of the speed error of one run into its parts.
+
+    Args:
+        lag_s: the best shift of the speed [s].
+        noise: what noise adds to the power of the speed error by its mean and by its variance [(m/s)2].
+    """
     steps = track.movement_steps
     ref_speed = speed(track.t, track.p_ref)[steps]
     error_power = _power(speed(track.t, track.p_actual)[steps] - ref_speed)
 
     reference, actual = _shifted_pair(track, lag_s, speed)
-    cycle = float(np.median(np.diff(track.t)))
+    cycle = _cycle(track.t)
     error = actual - reference
     after_shift = min(_power(error), error_power)
     shapes = np.column_stack([reference, np.gradient(np.gradient(reference, cycle), cycle)])
@@ -454,8 +424,7 @@ def error_budget(recording: Recording, track: TcpTrack, lag_s: float) -> Budget:
 
     fast = min(_power_above(rest, SPLIT_HZ * cycle), after_shape)
     slow = after_shape - fast
-    noise_slow, noise_fast = _noise_of_speed(recording, track)
-    noise_slow, noise_fast = min(noise_slow, slow), min(noise_fast, fast)
+    noise_slow, noise_fast = min(noise[0], slow), min(noise[1], fast)
     parts = (
         error_power - after_shift,
         after_shift - after_shape,
@@ -476,13 +445,3 @@ def _power_above(signal: Array, cycles_per_sample: float) -> float:
     power = np.square(np.abs(np.fft.rfft(signal))) / n**2
     power[1 : (n + 1) // 2] *= 2.0  # all but 0 and Nyquist stand for two conjugate lines
     return float(power[np.fft.rfftfreq(n) > cycles_per_sample].sum())
-
-
-def _noise_of_speed(recording: Recording, track: TcpTrack) -> tuple[float, float]:
-    """Return what noise at rest adds to the power of the speed error: by its mean, slow, and its variance."""
-    covariance = rest_noise(recording, track)
-    if covariance is None:
-        return 0.0, 0.0
-    v = velocity(track.t, track.p_ref)[track.movement_steps]
-    mean, variance = speed_noise(v, covariance)
-    return _power(mean), float(np.mean(variance))

@@ -16,6 +16,7 @@ import polars.selectors as cs
 from rich.console import Console
 from rich.progress import track as progress
 
+from pc_client.analysis.groups import COLUMNS
 from pc_client.analysis.measures import PARTS, SPLIT_HZ
 from pc_client.analysis.noise_floor import LEAST_STEPS
 from pc_client.analysis.run import MeasuredRun, analyse_run, budget_column
@@ -37,7 +38,7 @@ from pc_client.files import FILE_KINDS
 from pc_client.kinematics.arms import ROBOTS
 from pc_client.recording.recording import load_recording
 from pc_client.results.pages import picture, render, require_report_libraries, write_files
-from pc_client.results.tables import Column, to_html, to_json
+from pc_client.results.tables import Column, frame_of, to_html, to_json
 from protocol.ur_types import JOINT_NAMES
 from ur_hil.cell import NO_CELL, parse_cell
 
@@ -59,6 +60,7 @@ _BUDGET = (
     *(Column(f"{budget_column(part)}_alone_db", part, format=".1f", missing="–") for part in PARTS),
     replace(_LEVEL, header="all", unit=""),
 )
+_DIFFERENCES = (Column("of", "in, for", align="left", kind=str), *COLUMNS)
 _PATH_ERROR = Column("max_path_error_mm", "path error", "mm", ".2f")
 
 
@@ -279,9 +281,14 @@ def build_side_by_side(reports: Sequence[Report], out: Path) -> SideBySide:
         shown=shown,
         n_movements=len(shown.frame),
         cards=[(level.header, mean_by_kind(shown.frame, level.name)) for level in levels],
-        links=[_link(table, folder[id(table)], out) for table in shown.columns],
+        links=[
+            (Path(os.path.relpath(page, out.parent)).as_posix(), label)
+            for label, table in experiments
+            if (page := folder[id(table)] / REPORT_HTML).exists()
+        ],
         labels=shown.labels,
         levels=to_html(rows, [name, *levels, Column("n_targets", "targets"), *others], bold="is_mean"),
+        differences=to_html(frame_of(shown.differences, _DIFFERENCES), _DIFFERENCES),
         levels_figure=picture(
             figures.levels_figure(shown.frame, experiments, shown.mark),
             "Bars of the SNR of each movement: the paper's, and those of each experiment",
@@ -304,28 +311,26 @@ def build_side_by_side(reports: Sequence[Report], out: Path) -> SideBySide:
     return shown
 
 
-def _link(table: Table, folder: Path, out: Path) -> tuple[str, str] | None:
-    """The page of one experiment and its label; None where it has no page."""
-    page = folder / REPORT_HTML
-    return (Path(os.path.relpath(page, out.parent)).as_posix(), table.label) if page.exists() else None
-
-
 def _settings(tables: Sequence[Table]) -> str:
-    """One controller with its own and other numbers: the fields that differ, and for each what came of it."""
+    """One controller with its own and other numbers and paces: what differs, and for each what came of it."""
     configs = [table.provenance.controller_config for table in tables]
     fields = [name for name in FIELDS if len({config.get(name) for config in configs}) > 1]
-    kinds = tables[0].kinds
+    kinds, own = tables[0].kinds, tables[0]
     rows = [
         {name: f"{x:g}" if isinstance(x := config.get(name), float) else str(x) for name in fields}
         | {kind: table.mean_of(kind) for kind in kinds}
-        | {"n_runs": len(next(iter(table.runs.values()))), "is_own": table is tables[0]}
+        | {f"floor {kind}": table.mean_of(kind, FLOOR.name) for kind in kinds}
+        | {"duration": table.duration_in(own) or 1.0, "is_own": table is own}
+        | {"n_runs": len(next(iter(table.runs.values())))}
         | {LAG.name: table.frame[LAG.name].mean()}
         for table, config in zip(tables, configs, strict=True)
     ]
     columns = [
         *(Column(name, unit=getattr(FIELDS.get(name), "unit", "")) for name in fields),
+        Column("duration", "duration of the movements", "own = 1", ".2g"),
         Column("n_runs", "runs of each movement"),
         *(Column(kind, f"mean {kind}", "dB", ".2f") for kind in kinds),
+        *(Column(f"floor {kind}", f"noise floor {kind}", "dB", ".2f") for kind in kinds),
         LAG,
     ]
     return to_html(pl.DataFrame(rows, infer_schema_length=None), columns, bold="is_own")

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 from pc_client.analysis import measures
+from pc_client.analysis.noise_floor import noise_power, step_covariance
+from pc_client.arrays import Array
 from pc_client.errors import RecordingError
 from pc_client.recording.provenance import Provenance
 from pc_client.recording.recording import Recording
@@ -14,15 +17,37 @@ GIVEN_UP = "given up"
 """Kind of the movement of a run that did not come to its end."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, eq=False)
 class MeasuredRun:
-    """One recording and what was measured on it."""
+    """One recording and what was measured on it.
+
+    Attributes:
+        covariance: of the encoders' noise, (6, 6) [rad2], as all runs of the experiment show it at rest;
+            None: as this one does.
+    """
 
     recording: Recording
     track: measures.TcpTrack
     snr: measures.Snr
     errors: measures.Errors
-    budget: measures.Budget
+    covariance: Array | None = None
+
+    @cached_property
+    def noise(self) -> tuple[float, float]:
+        """What noise adds to the power of the speed error by its mean and its variance; 0 if not known."""
+        covariance = step_covariance([self]) if self.covariance is None else self.covariance
+        return noise_power(self, covariance) or (0.0, 0.0)
+
+    @property
+    def floor_db(self) -> float | None:
+        """The SNR [dB] at which noise alone would leave the run; None where the noise is not known."""
+        power, signal = sum(self.noise), self.budget.signal_power
+        return measures.decibels(signal, power) if power > 0.0 < signal else None
+
+    @cached_property
+    def budget(self) -> measures.Budget:
+        """The power of the speed error by its parts."""
+        return measures.error_budget(self.track, self.snr.speed_lag_s, self.noise)
 
     @property
     def provenance(self) -> Provenance:
@@ -77,7 +102,6 @@ def analyse_run(recording: Recording, *, include_aborted: bool = False) -> Measu
         track=track,
         snr=snr,
         errors=measures.measure_errors(recording, track, snr.velocity_lag_s),
-        budget=measures.error_budget(recording, track, snr.speed_lag_s),
     )
 
 

@@ -61,9 +61,8 @@ class Signals:
 
         The rows of the first 8 ms are 0.
         """
-        t, p, each = self.t, self.tcp_pose[:, :3], measures.rows_per_sample(self.t)
-        moved = np.linalg.norm(p[each:] - p[:-each], axis=1) / (t[each:] - t[:-each])
-        return np.concatenate((np.zeros(min(each, len(t))), moved))
+        moved = measures.speed(self.t, self.tcp_pose[:, :3])
+        return np.concatenate((np.zeros(len(self.t) - len(moved)), moved))
 
     def columns(self) -> Mapping[str, Array]:
         """Every number as a column (n,) of its own, by name; RTDE names where RTDE has the signal."""
@@ -111,7 +110,7 @@ class Run(Signals):
         recording = load_recording(path)
         track = measures.track_of(recording)
         t, q, qd, pose, command = (
-            recording.column(name)[track.new_rows]
+            recording.column(name)[track.rows]
             for name in ("timestamp", "actual_q", "actual_qd", "actual_TCP_pose", "cmd_qd")
         )
         whose, summary = recording.provenance, recording.summary
@@ -164,16 +163,16 @@ class Run(Signals):
     @property
     def ref_q(self) -> Array:
         """(n, 6) joint positions of the reference [rad]."""
-        return self.recording.column("ref_q")[self._track.new_rows]
+        return self.recording.column("ref_q")[self._track.rows]
 
     @property
     def ref_tcp_position(self) -> Array:
         """(n, 3) TCP position of the reference [m]."""
-        return self.recording.column("ref_tcp_position")[self._track.new_rows]
+        return self.recording.column("ref_tcp_position")[self._track.rows]
 
     def columns(self) -> Mapping[str, Array]:
         """Every number of the recording as a column (n,) of its own, with `t` and `tcp_speed`."""
-        rows = self._track.new_rows
+        rows = self._track.rows
         recorded = {name: values[rows] for name, values in flat_columns(self.recording).items()}
         return {"t": self.t, "tcp_speed": self.tcp_speed, **recorded}
 

@@ -9,15 +9,19 @@ row of the table that shows how the means move with these numbers.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
+from statistics import fmean
 from typing import TYPE_CHECKING, Any
 
 import polars as pl
+from scipy import stats
 
+from pc_client.analysis.groups import compare
 from pc_client.analysis.measures import decibels
-from pc_client.analysis.noise_floor import floor_db, step_covariance, unrepeatable_power
+from pc_client.analysis.noise_floor import step_covariance, unrepeatable_power
 from pc_client.analysis.run import GIVEN_UP, MeasuredRun
 from pc_client.errors import RecordingError
 from pc_client.recording.provenance import Provenance
@@ -41,14 +45,6 @@ PAPER_SNR_DB = {
     "lognorm_5_3": 21.88,
 }
 KINDS = ("uniform", "lognormal")
-
-_PAPER_ROWS = pl.DataFrame(
-    [
-        {"kind": KINDS[name.startswith("lognorm")], "name": name, "paper_snr_db": level}
-        for name, level in PAPER_SNR_DB.items()
-    ]
-)
-"""The paper's table as a frame."""
 
 _SHARED = "Paper: own points, not published; name, kind, number of targets agree"
 """Why no differences are given."""
@@ -151,7 +147,20 @@ class Table:
     def base(self) -> tuple[str, str]:
         """The arm, and the name of the controller that the numbers of this one started from."""
         p = self.provenance
-        return f"{p.arm} {p.pace}", str(p.controller_config.get("name", p.controller))
+        return f"{p.arm} {p.serial} {p.pace}", str(p.controller_config.get("name", p.controller))
+
+    def duration_in(self, other: Table) -> float | None:
+        """The duration of the movements as a share of those through the same points of another table.
+
+        None where the movements are others, or have no target points.
+        """
+        ours, theirs = (
+            {(run.provenance.kind, run.provenance.target_points): run.errors.duration_s for run in t.all_runs}
+            for t in (self, other)
+        )
+        if ours.keys() != theirs.keys() or not all(points for _, points in ours):
+            return None
+        return round(sum(ours.values()) / sum(theirs.values()), 2)
 
     @property
     def has_paper_rows(self) -> bool:
@@ -211,7 +220,7 @@ def build_table(runs: Sequence[MeasuredRun]) -> Table:
     """Build the table of one experiment.
 
     Args:
-        runs: at least one run; all of the same robot, seed, pace and controller.
+        runs: at least one run; all of the same arm, pace and controller.
 
     Raises:
         RecordingError: no runs, or runs of different experiments.
@@ -219,21 +228,23 @@ def build_table(runs: Sequence[MeasuredRun]) -> Table:
     if not runs:
         raise RecordingError("there is no run to put into a table; record at least one movement")
     experiments = [
-        (p.controller, p.robot, p.seed, p.pace, p.simulated) for p in (run.provenance for run in runs)
+        (p.controller, p.robot, p.serial, p.seed, p.pace, p.simulated)
+        for p in (run.provenance for run in runs)
     ]
     for run, experiment in zip(runs, experiments, strict=True):
         if experiment != experiments[0]:
             raise RecordingError(
                 f"{run.recording.path.name} is of another experiment than {runs[0].recording.path.name} "
-                "(robot, seed, pace or controller differ); keep one experiment a folder"
+                "(robot, serial number, seed, pace or controller differ); keep one experiment a folder"
             )
-    ordered = sorted(runs, key=lambda run: (*_rank(run), run.provenance.repetition))
-    by_name = {name: tuple(group) for name, group in groupby(ordered, lambda run: run.provenance.movement)}
     # The encoders are the same in all runs; the more of them are at rest, the better their noise is known.
     covariance = step_covariance(runs)
+    runs = [replace(run, covariance=covariance) for run in runs]
+    ordered = sorted(runs, key=lambda run: (*_rank(run), run.provenance.repetition))
+    by_name = {name: tuple(group) for name, group in groupby(ordered, lambda run: run.provenance.movement)}
     frame = _frame_of_runs(ordered).group_by("name", maintain_order=True).agg(_FIGURES)
     levels = {
-        "noise_floor_db": [floor_db(group[0], covariance) for group in by_name.values()],
+        "noise_floor_db": [group[0].floor_db for group in by_name.values()],
         # What does not repeat from run to run would leave this; None when it is not known.
         "unrepeatable_db": [
             decibels(group[0].budget.signal_power, power) if (power := unrepeatable_power(group)) else None
@@ -265,7 +276,7 @@ class SideBySide:
 
     Attributes:
         columns: what stands beside the paper's figures, in the order given.
-        changed: the same controllers with other numbers.
+        changed: the same controllers with other numbers, or with the same movements in another time.
     """
 
     columns: tuple[Table, ...]
@@ -293,8 +304,7 @@ class SideBySide:
         columns = [MOVEMENT]
         if self.has_paper_rows:
             columns.append(replace(PAPER, header="paper, real UR3", unit="dB", narrow="paper,\nreal UR3"))
-        for i, table in enumerate(self.columns):
-            label = table.label
+        for i, label in enumerate(self.labels):
             narrow = label.removesuffix(" controller")
             level, *others = (replace(figure, name=f"{figure.name}_{i}") for figure in SHOWN)
             columns += [replace(level, header=label, unit="dB", narrow=narrow), *others]
@@ -308,8 +318,20 @@ class SideBySide:
 
     @property
     def labels(self) -> list[str]:
-        """What the columns are called."""
-        return [table.label for table in self.columns]
+        """What the columns are called; experiments of one controller by what else differs, or numbered."""
+        names = []
+        for table in self.columns:
+            alike = [t.provenance for t in self.columns if t.label == table.label]
+            facts = {
+                id(p): (p.robot, f"serial {p.serial}" if p.seed is None else f"seed {p.seed}", p.pace)
+                for p in alike
+            }
+            differ = [i for i, column in enumerate(zip(*facts.values(), strict=True)) if len(set(column)) > 1]
+            names.append(", ".join([table.label, *(facts[id(table.provenance)][i] for i in differ)]))
+        return [
+            f"{name} ({names[:i].count(name) + 1})" if names.count(name) > 1 else name
+            for i, name in enumerate(names)
+        ]
 
     @property
     def mark(self) -> str:
@@ -317,20 +339,50 @@ class SideBySide:
         return ", ".join(dict.fromkeys(m for table in self.columns if (m := table.provenance.origin.mark)))
 
     @property
-    def finding(self) -> str:
-        """What the experiments show of the paper's finding, in one sentence; empty without both kinds."""
-        here = [
-            f"{better} ({label})"
-            for i, label in enumerate(self.labels)
-            if (better := _better(mean_by_kind(self.frame, f"{LEVEL.name}_{i}")))
+    def differences(self) -> list[dict[str, Any]]:
+        """Paired differences of the SNR, as rows of `compare`: of the kinds, and of the experiments.
+
+        `of` says in which experiment, or for which kind.
+        """
+
+        def runs(kind: str, table: Table) -> list[MeasuredRun]:
+            return [run for run in table.all_runs if run.provenance.kind == kind]
+
+        tables = dict(zip(self.labels, self.columns, strict=True))
+        groups = {label: {kind: runs(kind, table) for kind in KINDS[::-1]} for label, table in tables.items()}
+        groups |= {kind: {of: runs(kind, table) for of, table in reversed(tables.items())} for kind in KINDS}
+        return [
+            {"of": of, **row}
+            for of, several in groups.items()
+            if (known := {name: group for name, group in several.items() if group})
+            for row in compare(known).frame.to_dicts()
+            if row["minus"] and row["mean"] is not None
         ]
+
+    @property
+    def finding(self) -> str:
+        """What the experiments show of the paper's finding; empty without pairs of both kinds."""
+        here = [f"{said(row)} with {row['of']}" for row in self.differences if row["minus"] == KINDS[0]]
         if not here or not self.has_paper_rows:
             return ""
-        there = _better(mean_by_kind(_PAPER_ROWS, PAPER.name))
         return (
-            f"The paper found lognormal movements reproduced {there} than uniform ones (means of the SNR); "
-            f"here they are {', '.join(here)}."
+            f"{papers_finding()} Here lognormal less uniform, in pairs through the same points, is "
+            f"{'; '.join(here)}."
         )
+
+    @property
+    def offsets(self) -> list[str]:
+        """What the largest position error of each experiment is made of, a sentence each."""
+        worst = [
+            max((run.errors for run in table.all_runs), key=lambda e: e.max_position_error_mm)
+            for table in self.columns
+        ]
+        return [
+            f"{label}: {e.max_position_error_mm:.1f} mm, there the constant offset between the client's "
+            f"nominal arm and the robot's calibrated one is {math.hypot(*e.offset_mm):.1f} mm; without it "
+            f"and the lag {e.max_path_error_mm:.1f} mm are left."
+            for label, e in zip(self.labels, worst, strict=True)
+        ]
 
     @property
     def arms(self) -> list[str]:
@@ -341,9 +393,10 @@ class SideBySide:
         return [f"{', '.join(labels)}: {arm}" for arm, labels in arms.items()]
 
     def changes_of(self, table: Table) -> list[Table]:
-        """A column and the same controller with other numbers; nothing when there is none."""
+        """A column and what was changed of it; nothing when there is none."""
+        first = next(t for t in self.columns if t.base == table.base)
         changed = [other for other in self.changed if other.base == table.base]
-        return [table, *changed] if changed else []
+        return [table, *changed] if changed and table is first else []
 
     def to_rich(self) -> RichTable:
         """Return the table for the terminal."""
@@ -353,17 +406,41 @@ class SideBySide:
 
 
 def side_by_side(tables: Sequence[Table]) -> SideBySide:
-    """Put experiments beside each other; RecordingError if there is none."""
+    """Put experiments beside each other; RecordingError if there is none.
+
+    Where a controller has run with its own numbers, those with others, and faster or slower runs of the same
+    movements, are no columns but changes of it.
+    """
     if not tables:
         raise RecordingError("there is no experiment to show; give at least one folder")
-    unchanged = {table.base for table in tables if table.provenance.controller == table.base[1]}
-    changed = [t for t in tables if t.provenance.controller != t.base[1] and t.base in unchanged]
+    own: dict[tuple[str, str], Table] = {}
+    for table in tables:
+        if table.provenance.controller == table.base[1]:
+            own.setdefault(table.base, table)
+    changed = [
+        t
+        for t in tables
+        if (first := own.get(t.base))
+        and (t.provenance.controller != t.base[1] or t.duration_in(first) not in (None, 1.0))
+    ]
     return SideBySide(tuple(t for t in tables if t not in changed), tuple(changed))
 
 
-def _better(means: Mapping[str, float]) -> str:
-    """By how much lognormal movements came out better than uniform ones; empty where a kind is missing."""
-    if not means.keys() >= set(KINDS):
-        return ""
-    lead = means["lognormal"] - means["uniform"]
-    return f"{abs(lead):.1f} dB {'better' if lead > 0.0 else 'worse'}"
+def papers_finding() -> str:
+    """What the paper's ten values show of its finding, in one sentence."""
+    lognormal, uniform = (
+        [level for name, level in PAPER_SNR_DB.items() if name.startswith(kind)] for kind in ("logn", "unif")
+    )
+    low, high = stats.ttest_ind(lognormal, uniform, equal_var=False).confidence_interval()
+    return (
+        "The paper's ten values do not show a difference of lognormal and uniform movements that survives a "
+        f"test: five and five differ by {fmean(lognormal) - fmean(uniform):.1f} dB "
+        f"(95 %: {low:.1f} to {high:.1f} dB, Welch)."
+    )
+
+
+def said(row: Mapping[str, Any]) -> str:
+    """A row of `differences` in words."""
+    interval = "no interval" if row["p"] is None else "95 %: {low:.1f} to {high:.1f} dB".format(**row)
+    p = "" if row["p"] is None else f", p = {row['p']:.2g}"
+    return f"{round(row['mean'], 1) + 0.0:.1f} dB ({interval}; {row['n']} pair{'s' * (row['n'] != 1)}{p})"

@@ -126,7 +126,11 @@ def new(
     out: Annotated[Path, typer.Option("--out", metavar="FILE", help="Movement file to write, .toml.")],
     style: Annotated[
         Literal["human", "robot"],
-        typer.Option("--style", metavar="human|robot", help="Lognormal strokes, or constant speeds."),
+        typer.Option(
+            "--style",
+            metavar="human|robot",
+            help="Straight lognormal strokes (sigma .067, at rest at each point), or constant speeds.",
+        ),
     ] = "human",
     durations: Annotated[
         str | None,

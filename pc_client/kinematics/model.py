@@ -170,7 +170,8 @@ class SingularityMeasure(NamedTuple):
     """Measures of a stack of Jacobians (n, 6, 6).
 
     Attributes:
-        sigma_min: (n,) smallest singular value: the twist that joint speed 1 gives in the worst direction.
+        sigma_min: (n,) smallest singular value: the twist that joint speed 1 gives in the worst direction, in
+            rad/s and reaches of the arm a second.
         condition: (n,) largest over smallest singular value; inf when singular.
         critical_joint: (n,) joint that names the nearest singularity, a key of SINGULARITIES.
     """
@@ -180,13 +181,14 @@ class SingularityMeasure(NamedTuple):
     critical_joint: NDArray[np.intp]
 
 
-def measure_singularity(jacobians: ArrayLike) -> SingularityMeasure:
+def measure_singularity(jacobians: ArrayLike, reach: float) -> SingularityMeasure:
     """Measure Jacobians (n, 6, 6), linear rows first, in `base`; the TCP lies on the axis of wrist 3.
 
-    Lengths [m] and angles [rad] are mixed in them, and so in the measures.
+    Lengths are divided by the reach of the arm [m]: arms of all sizes have the same measures in a posture.
     """
     J = np.asarray(jacobians, dtype=np.float64)
-    sigma = np.asarray(np.linalg.svd(J, compute_uv=False), dtype=np.float64)
+    scaled = J / np.repeat((reach, 1.0), 3)[:, None]
+    sigma = np.asarray(np.linalg.svd(scaled, compute_uv=False), dtype=np.float64)
     sigma_min = sigma[:, -1]
     with np.errstate(divide="ignore"):
         condition = sigma[:, 0] / sigma_min

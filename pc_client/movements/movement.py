@@ -29,7 +29,8 @@ from pc_client.movements.trajectory import Motion, Similarity, Trajectory, check
 from pc_client.movements.uniform import SETBACK, Corners, uniform_trajectory
 from ur_hil.records import nearest
 
-#: "human": straight strokes by the paper's recipe; "robot": a smoothed square wave on the same lines.
+#: "human": straight lognormal strokes by the paper's recipe, sigma .067, at rest at each point; "robot": a
+#: smoothed square wave on the same lines.
 Style = Literal["human", "robot"]
 
 #: A table of target points without times.
@@ -99,8 +100,9 @@ class Movement:
 
         Args:
             points: (n, 3) [m]; at least two, consecutive ones apart.
-            style: "human", straight lognormal strokes by the paper's recipe; "robot", a smoothed trapezoid of
-                speed on the same lines.
+            style: "human", straight lognormal strokes by the paper's recipe: sigma .067, nearly symmetric, at
+                rest at each point, without arcs and overlap of strokes (docs/theory.md, section 2); "robot",
+                a smoothed trapezoid of speed on the same lines.
             durations: of the strokes between the points, (n - 1,) [s]; chosen from their lengths if None.
             name: as in recordings and tables.
             corners: of "robot" only: "stop" at inner points, or "blend" them.

@@ -108,7 +108,7 @@ def follow_path(
         q_before = solution.q
 
     # A singularity shows first as a small measure, then as failing steps: name the first sample of the two.
-    singularity = measure_singularity(jacobians)
+    singularity = measure_singularity(jacobians, model.description.reach)
     _refuse_singular(names, singularity, limits)
     if refusal is not None:
         raise refusal
@@ -133,7 +133,7 @@ def _lead_in(
         goal.rotation = Rotation.from_rotvec(turn * (k / steps)).as_matrix() @ R_branch
         goal.translation = p_branch + (names.p[0] - p_branch) * (k / steps)
         solution = solve_ik_se3(model, goal, q)
-        measure = measure_singularity(tcp_jacobian(model, solution.q)[None])
+        measure = measure_singularity(tcp_jacobian(model, solution.q)[None], model.description.reach)
         if not solution.converged or measure.sigma_min[0] < limits.sigma_min:
             raise names.refuse(
                 0,
@@ -152,7 +152,11 @@ def _refuse_step(
     off = solution.position_error, solution.rotation_error
     near = off[0] <= limits.position_error_max and off[1] <= limits.rotation_error_max
     if not (solution.converged or near):
-        joint = int(measure_singularity(tcp_jacobian(model, solution.q)[None]).critical_joint[0])
+        joint = int(
+            measure_singularity(
+                tcp_jacobian(model, solution.q)[None], model.description.reach
+            ).critical_joint[0]
+        )
         return names.refuse(
             k,
             f"out of reach: the nearest posture misses by {off[0] * 1e3:.2f} mm and"

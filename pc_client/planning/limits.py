@@ -25,7 +25,7 @@ class PlanLimits:
         tcp_speed_max: TCP speed limit [m/s].
         rest_speed_max: TCP speed at which a movement may begin and end; the spline is clamped there [m/s].
         joint_step_max: largest joint step between samples; more is a jump to another branch [rad].
-        sigma_min: smallest singular value of the Jacobian to keep (m and rad mixed).
+        sigma_min: smallest singular value of the Jacobian to keep, lengths in reaches of the arm.
         position_error_max: error of the inverse kinematics at a sample [m].
         rotation_error_max: the same for the orientation [rad].
         interpolation_error_max: distance of the spline from the movement between samples [m].
@@ -66,9 +66,9 @@ def limits_of(arm: RobotModel) -> PlanLimits:
         rest_speed_max=0.01,
         # 25 rad/s at 4 ms: four times what any joint can do, and far less than the distance of two branches.
         joint_step_max=0.1,
-        # At .03 a TCP speed of .1 m/s in the worst direction needs about 3.3 rad/s, the limit of a big joint.
-        # The box recommended for movements keeps .08 on a UR3; larger arms have larger values.
-        sigma_min=0.03,
+        # At .035 a TCP speed of a tenth of the reach a second in the worst direction needs 2.9 rad/s, nearly
+        # the limit of a big joint. The box recommended for movements keeps .16 on a UR3.
+        sigma_min=0.035,
         position_error_max=1e-9,
         rotation_error_max=1e-9,
         interpolation_error_max=1e-4,

@@ -197,7 +197,7 @@ def _plan_joints(trajectory: JointTrajectory, model: RobotModel) -> Plan:
     samples = CartesianSamples(t, p, v, movement.sample(0.5 * (t[1:] + t[:-1])).p)
     names = PathNames(name, t, p)
     exact = np.zeros(len(t))
-    path = JointPath(q, exact, exact, measure_singularity(jacobians))
+    path = JointPath(q, exact, exact, measure_singularity(jacobians, model.description.reach))
     report = check_motion(model, names, samples, check_samples(names, samples, limits), path, spline, limits)
     return Plan(movement, JointPlan(name, read_only(t), read_only(p), read_only(q), spline, report), "")
 

@@ -30,7 +30,7 @@ TEXT, _MARK_FILL, _MARK_EDGE = "#1C1C1C", "#FFF3CD", "#B8860B"
 _SHADE = "#F4F1EA"
 
 #: Letters of a figure that is eleven inches wide [points].
-LETTERS = 9.0
+_LETTERS = 9.0
 #: Inches of such a figure.
 WIDTH = 11.0
 
@@ -39,6 +39,9 @@ HOLLOW: dict[str, Any] = {"ls": "", "marker": "o", "mfc": "white", "ms": 5.0}
 
 OUTLINE = [withStroke(linewidth=2.5, foreground="white")]
 """Of texts that stand on curves."""
+
+_MARK_ROOM = 0.3
+"""At the top of a figure without a title [inches]."""
 
 _DPI = 110
 _FEW_GROUPS = 6
@@ -57,7 +60,7 @@ def figure(
     *,
     width: float = WIDTH,
     title: str = "",
-    letters: float = LETTERS,
+    letters: float = _LETTERS,
     layout: Literal["constrained"] | None = "constrained",
 ) -> Iterator[Figure]:
     """Give an empty figure in the theme, to be filled inside the block.
@@ -69,8 +72,10 @@ def figure(
     """
     with mpl.rc_context(_style(letters)):
         page = Figure(figsize=(width, height), layout=layout)
-        if title or mark:  # a blank keeps the line free for the mark
-            page.suptitle(title or " ", x=0.01, ha="left", fontsize=letters + 1, weight="bold")
+        if title:
+            page.suptitle(title, x=0.01, ha="left", fontsize=letters + 1, weight="bold")
+        elif mark and layout is not None:
+            page.set_layout_engine(layout, rect=(0.0, 0.0, 1.0, 1.0 - _MARK_ROOM / height))
         if mark:
             box = {"boxstyle": "round,pad=0.3", "fc": _MARK_FILL, "ec": _MARK_EDGE, "lw": 0.8}
             place = (0.992, 1.0 - 0.08 / height)
@@ -227,7 +232,7 @@ def bars_of_levels(
     return page
 
 
-def _style(letters: float = LETTERS) -> dict[str, Any]:
+def _style(letters: float = _LETTERS) -> dict[str, Any]:
     """Parameters of matplotlib (`matplotlib.rc_context`) with letters of a size [points]."""
     return {
         "font.family": "DejaVu Sans",  # comes with matplotlib, so every machine draws the same letters

@@ -77,8 +77,8 @@ CUTOFF_HZ = 5.0
 _ORDER = 2
 #: What the filter is, for tables.
 _FILTER_TEXT = f"Butterworth order {_ORDER}, forwards and backwards, half amplitude at {CUTOFF_HZ:g} Hz"
-#: Samples a second (Hz) of the plan: the rate of the reference figures.
-_PLAN_RATE = 1000.0
+#: Samples a second (Hz) of the plan: the rate of the reference figures; and of filtered and executed signals.
+_PLAN_RATE, _RATE = 1000.0, 1.0 / SAMPLING_TIME
 #: Rest (s) before and after a movement that is filtered with it.
 _REST = 0.2
 
@@ -90,23 +90,15 @@ class Sampled(Trace):
     a: Array
 
 
-def filtered(t: Array, p: Array, rate: float) -> Sampled:
-    """Positions through the filter, and their first two central differences.
+def filtered(t: Array, p: Array) -> Sampled:
+    """Positions (n, 3) [m] at times (n,) [s], 125 a second, through the filter; their first two differences.
 
-    Args:
-        t: times, (n,), s.
-        p: positions, (n, 3), m, at rest for the first and the last few tenths of a second.
-        rate: samples a second, Hz, more than twice the cutoff.
+    The movement is at rest for the first and the last few tenths of a second.
     """
-    if not (math.isfinite(rate) and rate > 2.0 * CUTOFF_HZ):
-        raise ClientError(
-            f"rate of {rate} Hz: a filter at {CUTOFF_HZ:g} Hz needs more than "
-            f"{2.0 * CUTOFF_HZ:g} samples a second"
-        )
     # The rests at both ends are long enough to be continued as they are.
-    smooth = low_passed(p, rate, cutoff=CUTOFF_HZ, order=_ORDER, padding=round(rate), ends="rest")
-    v = np.gradient(smooth, 1.0 / rate, axis=0)
-    return Sampled(t, smooth, v, np.gradient(v, 1.0 / rate, axis=0))
+    smooth = low_passed(p, _RATE, cutoff=CUTOFF_HZ, order=_ORDER, padding=round(_RATE), ends="rest")
+    v = np.gradient(smooth, SAMPLING_TIME, axis=0)
+    return Sampled(t, smooth, v, np.gradient(v, SAMPLING_TIME, axis=0))
 
 
 def planned_signal(movement: Movement) -> Sampled:
@@ -115,33 +107,26 @@ def planned_signal(movement: Movement) -> Sampled:
     return Sampled(t, *movement.motion(t))
 
 
-def filtered_signal(movement: Movement, rate: float) -> Sampled:
-    """The plan as a perfect robot would report it at the rate (Hz) of its control cycle, filtered."""
-    t = _grid(movement.duration, rate)
-    return _inner(filtered(t, movement.sample(t).p, rate), movement.duration)
+def filtered_signal(movement: Movement) -> Sampled:
+    """The plan as a perfect robot would report it at 125 Hz, filtered."""
+    t = _grid(movement.duration)
+    return _inner(filtered(t, movement.sample(t).p), movement.duration)
 
 
 def executed_signal(run: MeasuredRun, duration: float) -> Sampled:
-    """What the robot did in a movement of this duration (s), filtered.
+    """What the robot did in a movement of this duration (s), at 125 Hz, filtered.
 
     The window is that of the plan, later by the robot's lag, so that a late robot is not cut off.
     """
-    rate = _sampling_rate(run)
-    t = _grid(duration, rate)
+    t = _grid(duration)
     at = t + run.track.t_begin + run.snr.speed_lag_s
     # Frames come on the same grid but for the lag, which is no whole number of cycles.
     p = CubicSpline(run.track.t, run.track.p_actual)(np.clip(at, run.track.t[0], run.track.t[-1]))
-    return _inner(filtered(t, p, rate), duration)
+    return _inner(filtered(t, p), duration)
 
 
-def _sampling_rate(run: MeasuredRun) -> float:
-    """Samples a second of the track of a run, Hz."""
-    return 1.0 / max(run.provenance.cycle_time_s, SAMPLING_TIME)
-
-
-def _grid(duration: float, rate: float) -> Array:
-    before, after = round(_REST * rate), round((duration + _REST) * rate)
-    return np.arange(-before, after + 1) / rate
+def _grid(duration: float) -> Array:
+    return np.arange(-round(_REST * _RATE), round((duration + _REST) * _RATE) + 1) / _RATE
 
 
 def _inner(signal: Sampled, duration: float) -> Sampled:
@@ -196,13 +181,11 @@ class Comparison:
         frame: a row for each signal of each movement ("planned", "filtered" and, where it was, "executed"):
             generator, movement, duration [s], signal, the figures of `Likeness` (nan where there is nothing
             to fit) and of executed ones the SNR of Eq. 10, raw and after the best time shift.
-        rate: of the control cycle, Hz.
         robot: e.g. "SIMULATED UR3 3.15.8, seed 7, controller preview"; None where nothing was executed.
     """
 
     frame: pl.DataFrame
     n_strokes: int
-    rate: float
     robot: str | None
 
     @property
@@ -223,7 +206,7 @@ class Comparison:
     def notes(self) -> tuple[str, ...]:
         """What a reader must know of the columns."""
         return (
-            f"planned: closed form at {_PLAN_RATE:g} Hz. filtered, executed: positions at {self.rate:g} Hz, "
+            f"planned: closed form at {_PLAN_RATE:g} Hz. filtered, executed: positions at {_RATE:g} Hz, "
             f"{_FILTER_TEXT}, then differentiated.",
             "SPARC and LDJ: nearer to 0 is smoother; compare LDJ only within one of the three signals. "
             "beta: the exponent of speed = k curvature^-beta, from the first to the last peak of the speed; "
@@ -246,7 +229,7 @@ class Comparison:
         means = self.means.partition_by("generator", maintain_order=True)
         return {
             "robot": self.robot,
-            "rate_hz": self.rate,
+            "rate_hz": _RATE,
             "n_strokes": self.n_strokes,
             "filter": _FILTER_TEXT,
             "rows": finite(
@@ -290,26 +273,20 @@ def build_comparison(
     Raises:
         ClientError: a movement has no recording although others have.
     """
-    rate, robot = 1.0 / SAMPLING_TIME, None
+    robot = None
     if runs:
-        run = next(iter(runs.values()))
-        rate = _sampling_rate(run)
-        robot = f"{run.provenance.arm}, controller {run.provenance.controller}"
-    rows = [
-        row
-        for one in sets
-        for generator, movement in one.items()
-        for row in _rows(generator, movement, runs, rate)
-    ]
+        whose = next(iter(runs.values())).provenance
+        robot = f"{whose.arm}, controller {whose.controller}"
+    rows = [row for one in sets for kind, movement in one.items() for row in _rows(kind, movement, runs)]
     n_strokes = len(next(iter(sets[0].values())).target_points) - 1
-    return Comparison(pl.DataFrame(rows, infer_schema_length=None), n_strokes, rate, robot)
+    return Comparison(pl.DataFrame(rows, infer_schema_length=None), n_strokes, robot)
 
 
 def _rows(
-    generator: str, movement: Movement, runs: Mapping[str, MeasuredRun] | None, rate: float
+    generator: str, movement: Movement, runs: Mapping[str, MeasuredRun] | None
 ) -> Iterator[dict[str, Any]]:
     """One row for each signal of a movement."""
-    signals = {"planned": planned_signal(movement), "filtered": filtered_signal(movement, rate)}
+    signals = {"planned": planned_signal(movement), "filtered": filtered_signal(movement)}
     run = None
     if runs:
         run = runs.get(movement.name)

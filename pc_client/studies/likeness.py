@@ -20,6 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.signal import find_peaks
 
 from pc_client.arrays import Array
 from pc_client.errors import ClientError
@@ -113,26 +114,15 @@ def peaks_of(speed: ArrayLike) -> list[int]:
     A peak counts when the speed has risen by 5 % of the highest from the dip before it and falls by as much
     after it.
     """
-    values = np.asarray(speed, dtype=np.float64).tolist()
-    step = _PROMINENCE * max(values, default=0.0)
-    peaks: list[int] = []
+    values = np.asarray(speed, dtype=np.float64)
+    step = _PROMINENCE * float(values.max(initial=0.0))
     if step <= 0.0:
-        return peaks
+        return []
     # The signal comes from rest and goes to rest, so a movement cut off at its top speed has a peak there.
-    low, top, top_at, climbing = 0.0, 0.0, 0, True
-    for index, value in enumerate([*values, 0.0]):
-        if climbing:
-            if value > top:
-                top, top_at = value, index
-            elif value <= top - step:
-                if top - low >= step:
-                    peaks.append(top_at)
-                low, climbing = value, False
-        elif value < low:
-            low = value
-        elif value >= low + step:
-            top, top_at, climbing = value, index, True
-    return peaks
+    # The slope makes the first of equal samples the highest, and is more than their rounding.
+    slope = np.linspace(0.0, 1e-9 * step, len(values))
+    found, _ = find_peaks(np.concatenate(([0.0], values - slope, [0.0])), prominence=step)
+    return [int(peak) - 1 for peak in found]
 
 
 def speed_peaks(speed: ArrayLike) -> int:
@@ -146,18 +136,6 @@ def between_peaks(speed: ArrayLike) -> slice:
     return slice(peaks[0], peaks[-1] + 1) if peaks else slice(0, 0)
 
 
-def curvature_of(v: ArrayLike, a: ArrayLike) -> Array:
-    """Curvature |v x a| / |v|^3 of a path in space, (n,), 1/m; nan where it stands still.
-
-    The velocities are (n, 3), m/s, the accelerations (n, 3), m/s^2.
-    """
-    velocity, acceleration = np.asarray(v, dtype=np.float64), np.asarray(a, dtype=np.float64)
-    speed = np.linalg.norm(velocity, axis=1)
-    across = np.linalg.norm(np.cross(velocity, acceleration), axis=1)
-    moving = speed > 0.0
-    return np.where(moving, across / np.where(moving, speed, 1.0) ** 3, np.nan)
-
-
 class PowerLawFit(NamedTuple):
     """speed = gain curvature^-exponent through the logarithms, and how well it holds.
 
@@ -168,7 +146,6 @@ class PowerLawFit(NamedTuple):
 
     exponent: float
     r_squared: float
-    n_samples: int
 
 
 def fit_power_law(v: ArrayLike, a: ArrayLike, *, max_radius: float = 1.0) -> PowerLawFit:
@@ -184,19 +161,22 @@ def fit_power_law(v: ArrayLike, a: ArrayLike, *, max_radius: float = 1.0) -> Pow
         max_radius: samples on a path straighter than this radius (m) are left out: the curvature of a line
             is nearly zero.
     """
-    speed = np.linalg.norm(np.asarray(v, dtype=np.float64), axis=1)
-    curvature = curvature_of(v, a)
-    used = (speed > 0.1 * speed.max(initial=0.0)) & (curvature > 1.0 / max_radius)
+    velocity, acceleration = np.asarray(v, dtype=np.float64), np.asarray(a, dtype=np.float64)
+    speed = np.linalg.norm(velocity, axis=1)
+    moving = speed > 0.1 * speed.max(initial=0.0)
+    across = np.linalg.norm(np.cross(velocity, acceleration), axis=1)
+    curvature = np.divide(across, speed**3, out=np.zeros_like(speed), where=moving)
+    used = curvature > 1.0 / max_radius
     n_used = int(np.count_nonzero(used))
     if n_used < _MIN_SAMPLES:
-        return PowerLawFit(math.nan, math.nan, n_used)
+        return PowerLawFit(math.nan, math.nan)
     x, y = np.log(curvature[used]), np.log(speed[used])
     x, y = x - x.mean(), y - y.mean()
     spread, total = float(x @ x), float(y @ y)
     if spread < 1e-12 * n_used:  # one radius everywhere: any exponent would do
-        return PowerLawFit(math.nan, math.nan, n_used)
+        return PowerLawFit(math.nan, math.nan)
     slope = float(x @ y) / spread
-    return PowerLawFit(-slope, slope**2 * spread / total if total > 0.0 else math.nan, n_used)
+    return PowerLawFit(-slope, slope**2 * spread / total if total > 0.0 else math.nan)
 
 
 def _checked(speed: ArrayLike, rate: float) -> Array:

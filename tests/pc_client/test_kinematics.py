@@ -54,7 +54,7 @@ def test_the_oracle_solves_its_own_forward_kinematics(q):
     for solution in closed_form_ik(T).values():
         np.testing.assert_allclose(dh_pose(solution), T, rtol=0, atol=1e-11)
     # The posture itself is one of them, unless it is so near the wrist singularity that q4 and q6 blur.
-    if abs(np.sin(q[4])) > 1e-3 and measure_singularity(tcp_jacobian(UR3, q)[None]).sigma_min[0] > 1e-3:
+    if abs(np.sin(q[4])) > 1e-3 and measure_singularity(tcp_jacobian(UR3, q)[None], 1.0).sigma_min[0] > 1e-3:
         assert min(np.abs(wrap(q - solution)).max() for solution in closed_form_ik(T).values()) < 1e-8
 
 
@@ -95,7 +95,7 @@ def test_results_are_not_overwritten_by_the_next_call():
     ],
 )
 def test_known_singularities_are_seen_and_named(q_deg, joint):
-    measure = measure_singularity(tcp_jacobian(UR3, np.radians(q_deg))[None])
+    measure = measure_singularity(tcp_jacobian(UR3, np.radians(q_deg))[None], 0.5)
     assert measure.sigma_min[0] < 1e-10
     assert measure.condition[0] > 1e9
     assert measure.critical_joint[0] == joint
@@ -106,7 +106,7 @@ def test_the_wrist_above_the_base_axis_is_seen_and_named():
     postures = np.radians([(20, q2, -110, -60, 70, 30) for q2 in np.linspace(-180, 0, 2001)])
     radius = [np.hypot(*frames(q)[4][:2, 3]) for q in postures]
     nearest = postures[int(np.argmin(radius))]
-    measure = measure_singularity(tcp_jacobian(UR3, nearest)[None])
+    measure = measure_singularity(tcp_jacobian(UR3, nearest)[None], 0.5)
     assert measure.sigma_min[0] < 1e-3
     assert measure.critical_joint[0] == 0
 
@@ -114,11 +114,19 @@ def test_the_wrist_above_the_base_axis_is_seen_and_named():
 def test_condition_is_the_ratio_of_the_singular_values_and_the_least_that_of_the_inverse():
     q = np.random.default_rng(3).uniform(-3, 3, (30, 6))
     J = np.array([tcp_jacobian(UR3, q_k) for q_k in q])
-    measure = measure_singularity(J)
+    measure = measure_singularity(J, 1.0)
     np.testing.assert_allclose(measure.condition, np.linalg.cond(J), rtol=1e-9)
     np.testing.assert_allclose(
         measure.sigma_min, 1 / np.linalg.norm(np.linalg.inv(J), ord=2, axis=(1, 2)), rtol=1e-9
     )
+
+
+def test_an_arm_of_twice_the_size_is_as_near_a_singularity_in_the_same_posture():
+    q = np.random.default_rng(3).uniform(-3, 3, (30, 6))
+    J = np.array([tcp_jacobian(UR3, q_k) for q_k in q])
+    larger = J * np.repeat((2.0, 1.0), 3)[:, None]
+    small, large = measure_singularity(J, 0.5), measure_singularity(larger, 1.0)
+    np.testing.assert_allclose(small.sigma_min, large.sigma_min, rtol=1e-12)
 
 
 def test_a_near_seed_comes_back_to_the_same_posture():
@@ -126,7 +134,7 @@ def test_a_near_seed_comes_back_to_the_same_posture():
     tried = 0
     while tried < 300:
         q = rng.uniform(-2 * np.pi, 2 * np.pi, 6)
-        if measure_singularity(tcp_jacobian(UR3, q)[None]).sigma_min[0] < 0.05:
+        if measure_singularity(tcp_jacobian(UR3, q)[None], 1.0).sigma_min[0] < 0.05:
             continue
         tried += 1
         solution = solve_ik(UR3, dh_pose(q), q + rng.uniform(-0.03, 0.03, 6))

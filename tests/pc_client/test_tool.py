@@ -110,7 +110,8 @@ def test_the_floor_of_the_noise_is_that_of_the_tcp():
     from pc_client.analysis.noise_floor import _nominal
 
     def run(text):
-        return SimpleNamespace(provenance=SimpleNamespace(robot_model="UR3", cell_text=text))
+        whose = SimpleNamespace(robot_model="UR3", cell_text=text)
+        return SimpleNamespace(recording=SimpleNamespace(provenance=whose))
 
     lengths = [_nominal(run(text)).cell.tool.length for text in ("", MODEL.cell.text, "no TOML")]
     assert lengths == [0.0, HAND.length, 0.0]
