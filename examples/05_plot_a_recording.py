@@ -5,8 +5,8 @@ from pathlib import Path
 
 from matplotlib.axes import Axes
 
-from pc_client.analysis.figures import plot_speed
 from pc_client.analysis.run import MeasuredRun, analyse_run
+from pc_client.analysis.run_figures import plot_speed
 from pc_client.recording.recording import load_recording
 from pc_client.results.figures import BLUE, REFERENCE_GREY, figure, image_bytes, label_axes, show_legend
 

@@ -63,6 +63,7 @@ ELSEWHERE = {
     "make walk": "test_commands.py::test_a_target_begins_and_ends",
     "pip install": "test_wheel.py::test_the_commands_of_a_page_need_no_more_than_its_install",
     "python -c": "test_commands.py::test_the_mean_of_an_extraction",
+    "python -m docs.generate.results_page": "test_examples.py::test_demo_and_plot",
     "python -m protocol decode": "protocol/test_protocol_command.py::test_decode_realtime",
     "python -m protocol layout": "protocol/test_protocol_command.py::test_layout",
     "python examples/ablation.py": "test_examples.py::test_ablation",

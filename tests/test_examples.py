@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from docs.generate import results_page
+
 pytestmark = pytest.mark.timeout(360)  # on a busy machine
 EXAMPLES = Path(__file__).parents[1] / "examples"
 
@@ -95,6 +97,8 @@ def test_demo_and_plot(run, tmp_path):
     page = (tmp_path / "report.html").read_text()
     for table in found.values():
         assert f"{table['mean_snr_db']['lognormal']:.2f}" in page
+    taken_over = results_page.collected(tmp_path)
+    assert {row["controller"] for row in taken_over["rows"]} >= {"published controller", "preview"}
     figure = tmp_path / "speed.png"
     run("05_plot_a_recording.py", tmp_path / "preview" / "lognorm_4_1_r1.mcap", "--out", figure)
     assert figure.read_bytes().startswith(b"\x89PNG")

@@ -8,7 +8,8 @@
     inference     means with intervals, paired differences with their test
     groups        groups of runs compared by a figure
     table         Table I: ours beside the paper's
-    figures       bars and speeds of all movements; loads matplotlib, so import it only to draw
+    run_figures   one run, the runs of a movement; loads matplotlib, so import it only to draw
+    figures       bars and speeds of all movements; likewise
     report        one self-contained page from a folder of recordings
 
 Everything is computed from recordings alone; nothing here talks to a robot.

@@ -133,14 +133,14 @@ def build_tables(
 def render_page(table: Table, left_out: Iterable[str] = (), console: Console | None = None) -> str:
     """The text of `report.html`; RecordingError if matplotlib or jinja2 is not installed."""
     require_report_libraries()
-    from pc_client.analysis import figures
+    from pc_client.analysis import figures, run_figures
 
     movements = [
         {
             "row": row,
             "errors": table.runs[row["name"]][0].errors,
             "figure": picture(
-                figures.movement_figure(table.runs[row["name"]]),
+                run_figures.movement_figure(table.runs[row["name"]]),
                 f"Speed, speed error, path, joints and position error of {row['name']}",
             ),
         }

@@ -83,7 +83,7 @@ class Signals:
 
     def plot(self) -> Figure:
         """A figure: speed of the TCP, joint angles, joint velocities."""
-        from pc_client.analysis.figures import signals_figure
+        from pc_client.analysis.run_figures import signals_figure
 
         mark = origin_of(self.simulated).mark
         return signals_figure(self.t, self.tcp_speed, self.q, self.qd, self.qd_cmd, mark)
@@ -183,7 +183,7 @@ class Run(Signals):
         """
         if self.aborted:
             return super().plot()
-        from pc_client.analysis.figures import movement_figure
+        from pc_client.analysis.run_figures import movement_figure
 
         return movement_figure((self.measured,))
 
