@@ -396,7 +396,7 @@ class ServedBox:
                 self._arrived = []
         for (_, done), (result, error) in zip(commands, answer.outcomes, strict=True):
             done(result, error)
-        if answer.requests and self.network is not None:
+        if self.network is not None and (answer.requests or self.network.holds_back):
             self.network.carry_out(answer.requests)
         return answer
 

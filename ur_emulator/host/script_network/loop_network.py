@@ -56,6 +56,11 @@ class LoopNetwork:
         self._modbus = ModbusClient(loop, self.open, period_s, arrive, report)
         self._remotes = XmlRpcClient(loop, self.open, arrive, report)
 
+    @property
+    def holds_back(self) -> bool:
+        """Whether a peer waits until the script has read what has come."""
+        return bool(self._buffers.full)
+
     def carry_out(self, requests: Iterable[Request]) -> None:
         """Do what the machine asks for after a cycle; read on where there is room again."""
         for request in requests:
