@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from docs.generate import results_page
+import docs.generate.results_page as results_page
 
 pytestmark = pytest.mark.timeout(360)  # on a busy machine
 EXAMPLES = Path(__file__).parents[1] / "examples"
