@@ -29,6 +29,18 @@ from pc_client.recording.recorder import Recorder
 from pc_client.recording.recording import load_recording
 
 
+@pytest.fixture
+def drawn() -> None:
+    """The figures of a page are drawn."""
+
+
+@pytest.fixture(autouse=True)
+def not_drawn(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The others are empty: they take as long as all else."""
+    if "drawn" not in request.fixturenames:
+        monkeypatch.setattr("pc_client.results.figures.svg_text", lambda figure: "<svg/>")
+
+
 def record(
     folder: Path, movement: str, repetition: int, *, rest: float = 0.8, aborted: str = "", **changes: object
 ) -> Path:
@@ -108,6 +120,7 @@ def figures_of(html: str) -> list[str]:
     ]
 
 
+@pytest.mark.usefixtures("drawn")
 def test_report_is_one_page_that_needs_nothing_else(tmp_path: Path) -> None:
     for movement in ("uniform_4_1", "lognorm_4_1"):
         for k in (1, 2, 3):
@@ -135,6 +148,7 @@ def test_report_is_one_page_that_needs_nothing_else(tmp_path: Path) -> None:
     assert again.paths[2].read_text() == html
 
 
+@pytest.mark.usefixtures("drawn")
 @pytest.mark.parametrize(
     ("simulated", "mark", "arm"),
     [
@@ -180,6 +194,7 @@ def test_only_what_was_identified_is_reported_of_the_loop(
     assert report.table.to_json()["loop"] == loop
 
 
+@pytest.mark.usefixtures("drawn")
 def test_one_own_movement_is_not_set_beside_the_paper_and_has_no_means(tmp_path: Path) -> None:
     record(tmp_path, "wave", 1, rest=0.2)
     report = build_report(tmp_path)
@@ -203,6 +218,7 @@ def heads(html: str) -> list[str]:
     return re.findall(r"<th>(.*?)(?:<br>.*?)?</th>", html)
 
 
+@pytest.mark.usefixtures("drawn")
 def test_names_from_a_recording_cannot_break_the_page(tmp_path: Path) -> None:
     prov = provenance(movement="<b>evil", serial="<script>")
     record_movement(tmp_path / "evil_r1.mcap", lag=0.01, prov=prov)

@@ -257,7 +257,13 @@ def test_a_stroke_of_the_arcs_ends_where_the_speed_is_least(name: str) -> None:
     )
 
 
-@pytest.mark.parametrize("arm", ROBOTS)
+@pytest.mark.parametrize(
+    "arm",
+    [
+        arm if arm in ("ur3", "ur5e", "ur20") else pytest.param(arm, marks=pytest.mark.nightly)
+        for arm in ROBOTS
+    ],
+)
 def test_every_arm_can_do_the_library_in_its_own_box(arm: str) -> None:
     model, box = robot_model(arm), ROBOTS[arm].working_box
     planned = make_plan(load_movement("lognorm_4_1"), model).movement

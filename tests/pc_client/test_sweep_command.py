@@ -108,7 +108,8 @@ def test_ctrl_c_keeps_what_is_done_and_the_same_command_goes_on(quick_job, tmp_p
     assert len(ran) == 36
 
 
-def test_refused_and_failed_cases_are_rows_and_the_sweep_goes_on(job, tmp_path, capsys):
+def test_refused_and_failed_cases_are_rows_and_the_sweep_goes_on(job, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("pc_client.results.figures.svg_text", lambda figure: "")
     job(sweep_samples.invented)
     text = GRID.replace("seeds = [1]", "seeds = [1, 13]").replace("8.0]", "30.0]")
     out = tmp_path / "out"

@@ -43,6 +43,7 @@ def test_side_by_side_in_processes():
     assert all(outcome == invented(case) for case, outcome in outcomes)
 
 
+@pytest.mark.nightly
 def test_side_by_side_on_dask():
     distributed = pytest.importorskip("distributed")
     keeping = partial(invented, keep_recordings=True)
@@ -160,6 +161,7 @@ def test_leaving_ends_box_and_scratch_folder():
     assert not box.folder.exists()
 
 
+@pytest.mark.nightly
 def test_a_port_that_somebody_took_in_between_is_no_trouble(monkeypatch):
     with socket.create_server((HOST, 0)) as somebody:
         taken = somebody.getsockname()[1] - Ports().dashboard
@@ -171,6 +173,7 @@ def test_a_port_that_somebody_took_in_between_is_no_trouble(monkeypatch):
     assert next(offsets, None) is None
 
 
+@pytest.mark.nightly
 def test_a_box_that_is_refused_says_why():
     box = simulated_box(SimulatedArm("ur3", "perfect", 7))
     with pytest.raises(SweepError, match=r"does not start .*unknown fidelity 'perfect'"), box:
@@ -195,6 +198,7 @@ def test_a_box_that_dies_in_the_middle_is_named(monkeypatch):
     assert outcome.error.startswith("the simulated box died (exit code -9): ")
 
 
+@pytest.mark.nightly
 def test_a_box_ends_with_a_user_that_is_killed():
     code = (
         "from pc_client.studies.sweep.schedule import simulated_box; from pc_client.studies.sweep.case import SimulatedArm\n"
