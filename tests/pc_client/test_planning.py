@@ -187,6 +187,14 @@ def test_the_report_holds_what_an_independent_look_at_the_plan_finds():
     assert report.interpolation_error.value < 1e-6
 
 
+def test_the_top_joint_speed_may_lie_between_samples():
+    plan = plan_movement(Movement.library("uniform_4_1"), model=UR3, dt=0.05)
+    between = 0.5 * (plan.t[1:] + plan.t[:-1])
+    fastest, at_samples = (np.abs(plan.spline.sample(t)[1]).max(axis=0) for t in (between, plan.t))
+    assert (fastest > at_samples).any()
+    assert (plan.report.qd_peak >= fastest).all()
+
+
 def test_the_spline_stays_on_the_movement_between_samples():
     t = np.random.default_rng(10).uniform(0, PLAN.duration, 300)
     reached = np.array([dh_pose(q)[:3, 3] for q in PLAN.spline.sample(t)[0]])
