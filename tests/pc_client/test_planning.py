@@ -496,6 +496,13 @@ def test_a_start_out_of_reach_is_sample_zero():
     assert names_sample(error)
 
 
+def test_a_start_behind_a_singularity_is_refused_though_the_arm_could_stand_there():
+    start = (-0.106, -0.199, 0.144)
+    movement = Movement.through([start, (-0.106, -0.219, 0.144)])
+    with pytest.raises(PlanningError, match="without passing a singularity"):
+        plan_movement(movement, model=UR3)
+
+
 def test_a_path_through_the_shoulder_singularity_is_refused_before_it():
     # Straight over the base axis: the wrist centre passes within d4 of it.
     movement = StraightStrokes([(0.35, -0.05, 0.35), (-0.25, -0.05, 0.35)], 8.0, name="over the base")
