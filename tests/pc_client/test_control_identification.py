@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from control_loop import PERIOD, DelayedArm, recipe
@@ -165,3 +167,11 @@ def test_feedforward_with_lag_is_what_the_lag_undoes():
     ours, without = np.max(errors, axis=0)
     assert ours < 2e-5
     assert without > 20 * ours
+
+
+def test_a_controller_that_makes_up_for_no_lag_is_ahead_by_the_whole_delay():
+    """Also where dead time and lag are known apart, as learning needs them."""
+    learns = recipe(0.03, lag=0.01)
+    assert learns.ahead == (0.03, 0.01)
+    plain = replace(learns, controller=replace(learns.controller, compensates_lag=False, uses_ilc=True))
+    assert plain.ahead == pytest.approx((0.04, 0.0))
