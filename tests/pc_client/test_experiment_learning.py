@@ -22,7 +22,7 @@ from pc_client.errors import DriverError
 from pc_client.experiment import prediction
 from pc_client.experiment import run as runner
 from pc_client.experiment.excitation import learning_filter
-from pc_client.experiment.prediction import broken_limit
+from pc_client.experiment.prediction import broken_limit, guarded
 from pc_client.experiment.run import ExperimentRunner, Memory
 from pc_client.movements.movement import Movement, load_movement
 from pc_client.planning.plan import plan_movement
@@ -115,6 +115,14 @@ def test_the_guard_is_made_for_the_reference_that_runs(two, tmp_path, monkeypatc
     one = replace(two, planned=two.planned[:1], repeat=1)
     run(WavyRobot(), one, tmp_path, replace(CONTROLLERS["preview"], **changes))
     np.testing.assert_array_equal(predicted[-1], followed[-1])
+
+
+def test_the_guard_allows_what_the_loop_predicts_and_a_margin(two, plan):
+    own = CONTROLLERS["paper"]
+    recipe, predicted = guarded(plan, replace(RECIPE, controller=own), two.model)
+    assert recipe.controller.path_tolerance == pytest.approx(predicted.distance + 0.005)
+    assert recipe.controller.angle_tolerance == pytest.approx(predicted.angle + 0.035)
+    assert recipe.controller.path_tolerance < own.path_tolerance
 
 
 def test_preview_neither_learns_nor_separates_lag_from_delay(two, tmp_path):
