@@ -16,6 +16,7 @@ from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import ArgumentError, ControlError, RefusedError, WaitTimeoutError
 from ur_emulator.host.box_log import LogEntry
 from ur_emulator.host.box_options import ServedAt
+from ur_emulator.host.control_api import operations  # noqa: F401  # gives operations the names that are sent
 from ur_emulator.host.control_api.box_state import BoxState, Question
 from ur_emulator.host.control_api.step_operations import ReadIdentity, ReadLog, ReadState, WaitUntil
 from ur_emulator.machine.commands.operation import Operation
