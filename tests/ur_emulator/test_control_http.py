@@ -2,6 +2,8 @@
 
 import json
 import socket
+import subprocess
+import sys
 
 import pytest
 from box_support import inside
@@ -429,3 +431,13 @@ def test_a_control_port_that_cannot_be_is_refused(options, told):
 @pytest.mark.parametrize("host", ["127.9.9.9", "localhost", "::1"])
 def test_on_loopback_a_control_port_demands_no_token(host):
     ControlBox(host=host, control_port=0, port_base=None, in_process=True).close()
+
+
+def test_a_client_alone_knows_the_names_of_operations():
+    code = (
+        "from ur_emulator.host.control_api.http_client import ControlClient\n"
+        "from ur_emulator.host.control_api.step_operations import ReadState\n"
+        "print(ReadState.api_name)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "state\n"
